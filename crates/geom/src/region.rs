@@ -1,1 +1,393 @@
-//! region
+//! Closed planar areas: islands with holes, and their booleans.
+//!
+//! A [`Region`] is a set of islands on the integer [grid](crate::grid). Each island is one outer
+//! ring (counter-clockwise) and its holes (clockwise); an island inside a hole is an island of its
+//! own. Rings never cross; they may touch in points. Every operation returns a region in this
+//! form, in an order that depends on the input alone.
+//!
+//! The overlay engine underneath is i_overlay (integer coordinates, exact predicates); this module
+//! and [`offset`](crate::offset), which builds on it, are the only ones that know.
+
+use i_overlay::core::fill_rule::FillRule;
+use i_overlay::core::overlay::{Overlay, ShapeType};
+use i_overlay::core::overlay_rule::OverlayRule;
+use nalgebra::Point2;
+
+use crate::grid::{GridPoint, STEPS_PER_MM, mm, snap};
+use crate::simplify::simplify_ring;
+
+/// One closed ring; the last point is joined to the first.
+pub type Ring = Vec<GridPoint>;
+
+/// An outer ring and the holes in it.
+pub type Island = Vec<Ring>;
+
+/// Which windings are inside when rings overlap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fill {
+    /// Every place that is wound round at all: overlapping solids merge, and a solid turned inside
+    /// out still counts.
+    NonZero,
+    /// Places wound round counter-clockwise more often than clockwise.
+    Positive,
+}
+
+/// A planar area, possibly empty. See the [module](self).
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Region {
+    islands: Vec<Island>,
+}
+
+/// The least and greatest coordinates of a region, in grid steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GridBounds {
+    /// The least corner.
+    pub min: GridPoint,
+    /// The greatest corner.
+    pub max: GridPoint,
+}
+
+impl Region {
+    /// Returns the area that `rings` (mm) enclose; overlaps and crossings are resolved by `fill`.
+    #[must_use]
+    pub fn from_rings<'a>(rings: impl IntoIterator<Item = &'a [Point2<f64>]>, fill: Fill) -> Self {
+        let rings: Vec<Ring> =
+            rings.into_iter().map(|ring| ring.iter().map(snap).collect()).collect();
+        Self::from_grid_rings(&rings, fill)
+    }
+
+    /// Like [`from_rings`](Self::from_rings), for rings already on the grid.
+    #[must_use]
+    pub fn from_grid_rings(rings: &[Ring], fill: Fill) -> Self {
+        let mut overlay = Overlay::new(rings.iter().map(Vec::len).sum());
+        for ring in rings {
+            overlay.add_contour(ring, ShapeType::Subject);
+        }
+        Self { islands: overlay.overlay(OverlayRule::Subject, engine_rule(fill)) }
+    }
+
+    /// Returns the region of one island, as handed out by [`islands`](Self::islands).
+    #[must_use]
+    pub fn from_island(island: Island) -> Self {
+        Self { islands: vec![island] }
+    }
+
+    /// Returns whether there is nothing in it.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.islands.is_empty()
+    }
+
+    /// Returns the islands: outer ring first, holes after it.
+    #[must_use]
+    pub fn islands(&self) -> &[Island] {
+        &self.islands
+    }
+
+    /// Returns all rings, island by island.
+    pub fn rings(&self) -> impl Iterator<Item = &Ring> {
+        self.islands.iter().flatten()
+    }
+
+    /// Returns the number of points of all rings.
+    #[must_use]
+    pub fn point_count(&self) -> usize {
+        self.rings().map(Vec::len).sum()
+    }
+
+    /// Returns the area, mm².
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        self.rings().map(|ring| signed_area(ring)).sum()
+    }
+
+    /// Returns the length of all rings, mm.
+    #[must_use]
+    pub fn perimeter(&self) -> f64 {
+        self.rings().map(|ring| ring_length(ring)).sum()
+    }
+
+    /// Returns the bounding box; `None` when empty.
+    #[must_use]
+    pub fn bounds(&self) -> Option<GridBounds> {
+        let mut points = self.islands.iter().filter_map(|island| island.first()).flatten();
+        let first = *points.next()?;
+        let mut bounds = GridBounds { min: first, max: first };
+        for p in points {
+            bounds.min = GridPoint::new(bounds.min.x.min(p.x), bounds.min.y.min(p.y));
+            bounds.max = GridPoint::new(bounds.max.x.max(p.x), bounds.max.y.max(p.y));
+        }
+        Some(bounds)
+    }
+
+    /// Returns what lies in either region.
+    #[must_use]
+    pub fn union(&self, other: &Self) -> Self {
+        match (self.is_empty(), other.is_empty()) {
+            (true, _) => other.clone(),
+            (_, true) => self.clone(),
+            _ => self.combined(other, OverlayRule::Union),
+        }
+    }
+
+    /// Returns what lies in both regions.
+    #[must_use]
+    pub fn intersection(&self, other: &Self) -> Self {
+        if self.is_empty() || other.is_empty() || !self.boxes_meet(other) {
+            return Self::default();
+        }
+        self.combined(other, OverlayRule::Intersect)
+    }
+
+    /// Returns what lies in this region and not in `other`.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> Self {
+        if self.is_empty() || other.is_empty() || !self.boxes_meet(other) {
+            return self.clone();
+        }
+        self.combined(other, OverlayRule::Difference)
+    }
+
+    /// Returns what lies in at least one of `regions`.
+    #[must_use]
+    pub fn union_of(regions: &[&Self]) -> Self {
+        let mut overlay = Overlay::new(regions.iter().map(|r| r.point_count()).sum());
+        for ring in regions.iter().flat_map(|region| region.rings()) {
+            overlay.add_contour(ring, ShapeType::Subject);
+        }
+        Self { islands: overlay.overlay(OverlayRule::Subject, FillRule::Positive) }
+    }
+
+    /// Returns what lies in every one of `regions`; empty for an empty list.
+    ///
+    /// One sweep instead of a chain of intersections: all rings are laid over each other, together
+    /// with n − 1 clockwise frames around everything, so that only places wound round n times
+    /// remain positive.
+    #[must_use]
+    pub fn common_to(regions: &[&Self]) -> Self {
+        let boxes: Option<Vec<GridBounds>> = regions.iter().map(|r| r.bounds()).collect();
+        let Some(boxes) = boxes else { return Self::default() };
+        let (Some(first), [_, rest @ ..]) = (boxes.first(), boxes.as_slice()) else {
+            return Self::default();
+        };
+        if let [only] = regions {
+            return (*only).clone();
+        }
+        let around = rest.iter().fold(*first, |a, b| GridBounds {
+            min: GridPoint::new(a.min.x.min(b.min.x), a.min.y.min(b.min.y)),
+            max: GridPoint::new(a.max.x.max(b.max.x), a.max.y.max(b.max.y)),
+        });
+        let clockwise_frame = [
+            GridPoint::new(around.min.x - 1, around.min.y - 1),
+            GridPoint::new(around.min.x - 1, around.max.y + 1),
+            GridPoint::new(around.max.x + 1, around.max.y + 1),
+            GridPoint::new(around.max.x + 1, around.min.y - 1),
+        ];
+        let mut overlay = Overlay::new(regions.iter().map(|r| r.point_count()).sum());
+        for _ in rest {
+            overlay.add_contour(&clockwise_frame, ShapeType::Subject);
+        }
+        for ring in regions.iter().flat_map(|region| region.rings()) {
+            overlay.add_contour(ring, ShapeType::Subject);
+        }
+        Self { islands: overlay.overlay(OverlayRule::Subject, FillRule::Positive) }
+    }
+
+    /// Returns the region with rings thinned out to within `tolerance` (mm); rings that collapse
+    /// are dropped. Crossings that thinning may cause between close rings are resolved.
+    #[must_use]
+    pub fn simplified(&self, tolerance: f64) -> Self {
+        let rings: Vec<Ring> = self
+            .rings()
+            .map(|ring| simplify_ring(ring, tolerance))
+            .filter(|ring| ring.len() >= 3)
+            .collect();
+        Self::from_grid_rings(&rings, Fill::Positive)
+    }
+
+    /// Returns the region without the islands smaller than `least_area` (mm²).
+    #[must_use]
+    pub fn without_small_islands(&self, least_area: f64) -> Self {
+        let keep = |island: &&Island| {
+            island.iter().map(|ring| signed_area(ring)).sum::<f64>() >= least_area
+        };
+        Self { islands: self.islands.iter().filter(keep).cloned().collect() }
+    }
+
+    /// Returns whether the point (mm) lies inside; undecided exactly on a ring.
+    #[must_use]
+    pub fn contains(&self, p: &Point2<f64>) -> bool {
+        let mut inside = false;
+        for ring in self.rings() {
+            for (a, b) in ring_sides(ring) {
+                let (a, b) = (mm(a), mm(b));
+                if (a.y > p.y) != (b.y > p.y) {
+                    let x = a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
+                    inside ^= p.x < x;
+                }
+            }
+        }
+        inside
+    }
+
+    /// Returns whether the whole segment from `a` to `b` (mm) lies inside.
+    #[must_use]
+    pub fn contains_segment(&self, a: &Point2<f64>, b: &Point2<f64>) -> bool {
+        let crosses =
+            |ring: &Ring| ring_sides(ring).any(|(c, d)| segments_cross(a, b, &mm(c), &mm(d)));
+        self.contains(a) && !self.rings().any(crosses)
+    }
+
+    /// Checks what the module promises of every region: rings of three points or more, outer rings
+    /// counter-clockwise, holes clockwise. For tests.
+    ///
+    /// # Panics
+    ///
+    /// When a promise is broken.
+    pub fn check(&self) {
+        for island in &self.islands {
+            assert!(!island.is_empty(), "an island has an outer ring");
+            for (k, ring) in island.iter().enumerate() {
+                assert!(ring.len() >= 3, "a ring has three points");
+                let area = signed_area(ring);
+                assert!(if k == 0 { area > 0.0 } else { area < 0.0 }, "ring {k} has area {area}");
+            }
+        }
+    }
+
+    fn combined(&self, other: &Self, rule: OverlayRule) -> Self {
+        let mut overlay = Overlay::from_subj_and_clip(&self.islands, &other.islands);
+        Self { islands: overlay.overlay(rule, FillRule::NonZero) }
+    }
+
+    fn boxes_meet(&self, other: &Self) -> bool {
+        let (Some(a), Some(b)) = (self.bounds(), other.bounds()) else { return false };
+        a.min.x <= b.max.x && b.min.x <= a.max.x && a.min.y <= b.max.y && b.min.y <= a.max.y
+    }
+}
+
+fn engine_rule(fill: Fill) -> FillRule {
+    match fill {
+        Fill::NonZero => FillRule::NonZero,
+        Fill::Positive => FillRule::Positive,
+    }
+}
+
+/// Returns the sides of a ring as pairs of ends, the closing side last.
+pub fn ring_sides(ring: &[GridPoint]) -> impl Iterator<Item = (GridPoint, GridPoint)> + '_ {
+    let next = ring.iter().cycle().skip(1);
+    ring.iter().zip(next).map(|(a, b)| (*a, *b))
+}
+
+/// Returns the signed area of a ring, mm²: positive when counter-clockwise.
+#[must_use]
+pub fn signed_area(ring: &[GridPoint]) -> f64 {
+    let Some(&origin) = ring.first() else { return 0.0 };
+    // Differences from one corner stay below 2^31, their products below 2^62: exact.
+    let local =
+        |p: GridPoint| (i64::from(p.x) - i64::from(origin.x), i64::from(p.y) - i64::from(origin.y));
+    let twice: i128 = ring_sides(ring)
+        .map(|(a, b)| {
+            let ((ax, ay), (bx, by)) = (local(a), local(b));
+            i128::from(ax * by - bx * ay)
+        })
+        .sum();
+    twice as f64 / (2.0 * STEPS_PER_MM * STEPS_PER_MM)
+}
+
+/// Returns the length of a ring, mm.
+#[must_use]
+pub fn ring_length(ring: &[GridPoint]) -> f64 {
+    ring_sides(ring).map(|(a, b)| (mm(b) - mm(a)).norm()).sum()
+}
+
+/// Returns whether two segments cross or touch, apart from rounding.
+fn segments_cross(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>, d: &Point2<f64>) -> bool {
+    let side = |p: &Point2<f64>, q: &Point2<f64>, r: &Point2<f64>| (q - p).perp(&(r - p));
+    let (c_side, d_side) = (side(a, b, c), side(a, b, d));
+    let (a_side, b_side) = (side(c, d, a), side(c, d, b));
+    c_side * d_side <= 0.0 && a_side * b_side <= 0.0 && (c_side != d_side || a_side != b_side)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rectangle(x: f64, y: f64, width: f64, height: f64) -> Vec<Point2<f64>> {
+        [[x, y], [x + width, y], [x + width, y + height], [x, y + height]].map(Point2::from).into()
+    }
+
+    fn region(rings: &[Vec<Point2<f64>>]) -> Region {
+        let region = Region::from_rings(rings.iter().map(Vec::as_slice), Fill::NonZero);
+        region.check();
+        region
+    }
+
+    fn near(actual: f64, expected: f64) {
+        assert!((actual - expected).abs() < 1e-6, "{actual} is not {expected}");
+    }
+
+    #[test]
+    fn nesting_gives_islands_and_holes() {
+        let mut hole = rectangle(1.0, 1.0, 8.0, 8.0);
+        hole.reverse();
+        let nested =
+            region(&[rectangle(0.0, 0.0, 10.0, 10.0), hole, rectangle(4.0, 4.0, 2.0, 2.0)]);
+        assert_eq!(nested.islands().len(), 2);
+        near(nested.area(), 100.0 - 64.0 + 4.0);
+        near(nested.perimeter(), 40.0 + 32.0 + 8.0);
+        assert!(nested.contains(&Point2::new(5.0, 5.0)));
+        assert!(!nested.contains(&Point2::new(2.0, 2.0)));
+    }
+
+    #[test]
+    fn area_identities_hold() {
+        let a = region(&[rectangle(0.0, 0.0, 10.0, 10.0)]);
+        let b = region(&[rectangle(4.0, 5.0, 10.0, 3.0)]);
+        near(a.intersection(&b).area(), 18.0);
+        near(a.union(&b).area() + a.intersection(&b).area(), a.area() + b.area());
+        near(a.difference(&b).area(), a.area() - 18.0);
+        near(Region::union_of(&[&a, &b, &a]).area(), a.union(&b).area());
+    }
+
+    #[test]
+    fn common_to_all_equals_a_chain_of_intersections() {
+        let parts: Vec<Region> = (0..6)
+            .map(|i| {
+                let i = f64::from(i);
+                region(&[rectangle(i, 0.3 * i, 12.0, 9.0), rectangle(40.0, i, 3.0, 10.0)])
+            })
+            .collect();
+        let parts: Vec<&Region> = parts.iter().collect();
+        let chain = parts[1..].iter().fold(parts[0].clone(), |a, b| a.intersection(b));
+        let common = Region::common_to(&parts);
+        common.check();
+        near(common.area(), chain.area());
+        assert!(Region::common_to(&[]).is_empty());
+        assert_eq!(Region::common_to(&parts[..1]), *parts[0]);
+        assert!(Region::common_to(&[parts[0], &Region::default()]).is_empty());
+    }
+
+    #[test]
+    fn reversed_solid_still_counts_and_overlaps_merge() {
+        let mut reversed = rectangle(5.0, 0.0, 10.0, 10.0);
+        reversed.reverse();
+        near(region(&[rectangle(20.0, 0.0, 1.0, 1.0), reversed]).area(), 101.0);
+        near(
+            region(&[rectangle(0.0, 0.0, 10.0, 10.0), rectangle(5.0, 0.0, 10.0, 10.0)]).area(),
+            150.0,
+        );
+    }
+
+    #[test]
+    fn segments_that_leave_are_noticed() {
+        let mut hole = rectangle(4.0, 4.0, 2.0, 2.0);
+        hole.reverse();
+        let frame = region(&[rectangle(0.0, 0.0, 10.0, 10.0), hole]);
+        let p = Point2::new;
+        assert!(frame.contains_segment(&p(1.0, 1.0), &p(9.0, 1.0)));
+        assert!(!frame.contains_segment(&p(1.0, 5.0), &p(9.0, 5.0)), "through the hole");
+        assert!(!frame.contains_segment(&p(1.0, 1.0), &p(11.0, 1.0)), "out");
+        assert!(!frame.contains_segment(&p(-2.0, 1.0), &p(12.0, 1.0)), "both ends outside");
+    }
+}

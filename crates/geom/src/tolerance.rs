@@ -58,10 +58,10 @@ impl Tolerances {
     /// [`ToleranceError`] names the relation that does not hold.
     pub fn new(simplify_mm: f64, chord_mm: f64) -> Result<Self, ToleranceError> {
         let grid_mm = 1.0 / STEPS_PER_MM;
-        if !(simplify_mm > grid_mm) {
+        if simplify_mm.is_nan() || simplify_mm <= grid_mm {
             return Err(ToleranceError::BelowGrid { simplify_mm, grid_mm });
         }
-        if !(chord_mm > simplify_mm) {
+        if chord_mm.is_nan() || chord_mm <= simplify_mm {
             return Err(ToleranceError::ChordBelowSimplify { chord_mm, simplify_mm });
         }
         Ok(Self { simplify_mm, chord_mm })
