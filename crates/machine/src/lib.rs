@@ -1,1 +1,13 @@
-//! machine
+//! All that changes when another printer is bought.
+//!
+//! [`profile`] is the printer as facts: axes, limits, nozzle. [`kinematics`] turns places in the
+//! part into joint positions and back, with the machine's own misalignment. [`program`] is the
+//! motion program in joints, and [`gcode`] writes it as text in the words of a firmware and reads
+//! text back.
+//!
+//! This crate knows neither meshes nor slicing: it must stay useful alone, for calibration.
+
+pub mod gcode;
+pub mod kinematics;
+pub mod profile;
+pub mod program;

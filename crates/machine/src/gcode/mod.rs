@@ -1,0 +1,11 @@
+//! Programs as text: writing, reading, and the words of each firmware.
+
+pub mod dialect;
+mod emit;
+mod number;
+mod parse;
+
+pub use dialect::Dialect;
+pub use emit::{Emitter, MOST_COLUMNS, printable};
+pub use number::decimal;
+pub use parse::{Code, Command, Line, SyntaxError, parse_line};

@@ -1,0 +1,183 @@
+//! From a place in the part to joint positions, and back.
+//!
+//! Frames, all right-handed, z up, mm: *Part* turns with the bed, its z axis is the axis of
+//! rotation up to the plate's own misplacement; *Machine* does not turn, its origin is on the axis
+//! of rotation, +x runs along the rail outwards.
+//!
+//! With the carriage at `s` the nozzle stands at Machine `(u, v)`, `u = s + a + a1·z`,
+//! `v = b + b1·z`, and over the bed at `q = Rz(theta)·(u, v)`; the plate carries the part at
+//! `q = e + Rz(psi)·p`. The inverse has two branches, the carriage on either side of the axis:
+//! `u = ±√(|q|² − v²)`, `theta = atan2(u·qy − v·qx, u·qx + v·qy)`. On a perfect machine this is
+//! the ordinary polar angle and radius.
+//!
+//! Derivation and identifiability of the constants: the calibration of a polar printer's centre,
+//! where the rail misses the axis by `b`. A disc of radius `|v|` about the axis is out of reach of
+//! the nozzle's centre.
+
+use nalgebra::{Point2, Point3, Rotation2, Vector2};
+
+use crate::program::{BedTurn, Joints};
+
+/// How a real machine misses the ideal one. All zero by default.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Alignment {
+    /// True minus commanded position along the rail, mm.
+    pub a: f64,
+    /// How far the rail misses the axis, mm, positive towards +y of Machine.
+    pub b: f64,
+    /// Lean of the lift along the rail, mm per mm of height.
+    pub a1: f64,
+    /// Lean of the lift across the rail, mm per mm of height.
+    pub b1: f64,
+    /// Where the plate's centre lies on the bed, mm.
+    pub plate_offset: Vector2<f64>,
+    /// How the plate is turned on the bed, radians.
+    pub plate_angle: f64,
+}
+
+/// The side of the axis on which the carriage stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Branch {
+    /// Where the rail's positive end is.
+    Near,
+    /// Beyond the axis.
+    Far,
+}
+
+impl Branch {
+    /// Returns +1 for the near side, −1 for the far side.
+    #[must_use]
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Near => 1.0,
+            Self::Far => -1.0,
+        }
+    }
+
+    /// Returns the other side.
+    #[must_use]
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Near => Self::Far,
+            Self::Far => Self::Near,
+        }
+    }
+}
+
+/// The nozzle cannot stand over a point of the bed.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "the nozzle passes the rotation axis at {miss:.3} mm and cannot stand {radius:.3} mm from it"
+)]
+pub struct Unreachable {
+    /// Distance of the point from the axis, mm.
+    pub radius: f64,
+    /// Least distance that the nozzle can have, mm.
+    pub miss: f64,
+}
+
+impl Alignment {
+    /// Returns where in the part the nozzle stands.
+    #[must_use]
+    pub fn part_from_joints(&self, joints: &Joints) -> Point3<f64> {
+        let nozzle =
+            Vector2::new(joints.s + self.a + self.a1 * joints.z, self.b + self.b1 * joints.z);
+        let over_bed = Rotation2::new(joints.turn.radians()) * nozzle;
+        let part = Rotation2::new(-self.plate_angle) * (over_bed - self.plate_offset);
+        Point3::new(part.x, part.y, joints.z)
+    }
+
+    /// Returns the joints that bring the nozzle over `part`, with the bed turned as little as
+    /// possible from `near`. On the axis itself the bed stays where it is.
+    ///
+    /// # Errors
+    ///
+    /// [`Unreachable`] inside the disc that the rail misses.
+    pub fn joints_from_part(
+        &self,
+        part: &Point3<f64>,
+        branch: Branch,
+        near: BedTurn,
+    ) -> Result<Joints, Unreachable> {
+        let q = self.over_bed(&part.xy());
+        let v = self.b + self.b1 * part.z;
+        let square = q.norm_squared() - v * v;
+        if square < 0.0 {
+            return Err(Unreachable { radius: q.norm(), miss: v.abs() });
+        }
+        let u = branch.sign() * square.sqrt();
+        let turn = if q == Vector2::zeros() {
+            near
+        } else {
+            near.nearest((u * q.y - v * q.x).atan2(u * q.x + v * q.y))
+        };
+        Ok(Joints { s: u - self.a - self.a1 * part.z, turn, z: part.z })
+    }
+
+    /// Returns the point of the bed, seen from the axis, on which a point of the part lies.
+    #[must_use]
+    pub fn over_bed(&self, part: &Point2<f64>) -> Vector2<f64> {
+        self.plate_offset + Rotation2::new(self.plate_angle) * part.coords
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    const LEANING: Alignment = Alignment {
+        a: 0.2,
+        b: 0.35,
+        a1: 0.0015,
+        b1: -0.002,
+        plate_offset: Vector2::new(0.3, -0.4),
+        plate_angle: 0.05,
+    };
+
+    #[test]
+    fn an_ideal_machine_is_ordinary_polar() {
+        let joints = Alignment::default()
+            .joints_from_part(&Point3::new(-3.0, 4.0, 7.0), Branch::Near, BedTurn::default())
+            .unwrap();
+        assert!((joints.s - 5.0).abs() < 1e-15);
+        assert!((joints.turn.radians() - 4.0_f64.atan2(-3.0)).abs() < 1e-15);
+        assert_eq!(joints.z, 7.0);
+    }
+
+    #[test]
+    fn forward_undoes_inverse_on_both_branches() {
+        let mut worst: f64 = 0.0;
+        for i in 0..20_000_u32 {
+            let t = f64::from(i);
+            let radius = 1.0 + 110.0 * (t * 0.618).fract();
+            let angle = t * 2.4;
+            let part =
+                Point3::new(radius * angle.cos(), radius * angle.sin(), (t * 0.37).fract() * 150.0);
+            let near = BedTurn::accumulated((t * 0.1).sin() * 400.0);
+            for branch in [Branch::Near, Branch::Far] {
+                let joints = LEANING.joints_from_part(&part, branch, near).unwrap();
+                assert!((joints.turn.radians() - near.radians()).abs() <= PI + 1e-9);
+                worst = worst.max((LEANING.part_from_joints(&joints) - part).norm());
+            }
+        }
+        assert!(worst < 1e-12 * 200.0, "{worst}");
+    }
+
+    #[test]
+    fn the_disc_that_the_rail_misses_is_out_of_reach() {
+        let alignment = Alignment { b: 0.5, ..Alignment::default() };
+        let inside = Point3::new(0.3, -0.2, 0.0);
+        let error = alignment.joints_from_part(&inside, Branch::Near, BedTurn::default());
+        assert_eq!(error.unwrap_err().miss, 0.5);
+    }
+
+    #[test]
+    fn on_the_axis_the_bed_stays() {
+        let near = BedTurn::accumulated(17.0);
+        let joints = Alignment::default()
+            .joints_from_part(&Point3::new(0.0, 0.0, 1.0), Branch::Far, near)
+            .unwrap();
+        assert_eq!((joints.s, joints.turn), (-0.0, near));
+    }
+}
