@@ -16,7 +16,7 @@
 use nalgebra::{Point2, Vector2};
 
 use crate::grid::{GridPoint, STEPS_PER_MM};
-use crate::region::{Fill, Region, Ring};
+use crate::region::{Fill, Region, Ring, signed_area};
 
 /// How far an arc's chords may cut into it, mm. Larger shows in outer walls at concave corners
 /// (their budget is 4 µm rms); smaller multiplies the points of every later step.
@@ -42,15 +42,30 @@ impl Region {
         self.inset(radius).outset(radius)
     }
 
+    /// Returns the inset and the area (mm²) over which its border ran into itself: zero, up to
+    /// rounding, when every part of the region is at least twice `distance` thick.
+    ///
+    /// That area is what the raw rings enclose with the wrong winding; it costs nothing to know.
+    #[must_use]
+    pub fn inset_with_loss(&self, distance: f64) -> (Self, f64) {
+        let raw = self.raw_rings(distance);
+        let enclosed: f64 = raw.iter().map(|ring| signed_area(ring)).sum();
+        let inset = Self::from_grid_rings(&raw, Fill::Positive);
+        let lost = inset.area() - enclosed;
+        (inset, lost)
+    }
+
     /// Moves the border to the left of its direction, that is inwards, by `shift` mm.
     fn shifted(&self, shift: f64) -> Self {
-        debug_assert!(shift.is_finite());
         if self.is_empty() || shift == 0.0 {
             return self.clone();
         }
-        let raw: Vec<Ring> =
-            self.rings().map(|ring| raw_ring(ring, shift * STEPS_PER_MM)).collect();
-        Self::from_grid_rings(&raw, Fill::Positive)
+        Self::from_grid_rings(&self.raw_rings(shift), Fill::Positive)
+    }
+
+    fn raw_rings(&self, shift: f64) -> Vec<Ring> {
+        debug_assert!(shift.is_finite());
+        self.rings().map(|ring| raw_ring(ring, shift * STEPS_PER_MM)).collect()
     }
 }
 
@@ -288,6 +303,24 @@ mod tests {
                 assert_eq!(outer.contains(&p), inside || from_border < distance);
             }
         }
+    }
+
+    #[test]
+    fn loss_tells_whether_anything_is_too_thin() {
+        let solid = square(10.0);
+        assert!(solid.inset_with_loss(4.9).1.abs() < 1e-9);
+        let bar = region(&[vec![[0.0, 0.0], [10.0, 0.0], [10.0, 0.8], [0.0, 0.8]]]);
+        assert!(bar.inset_with_loss(0.39).1.abs() < 1e-9);
+        assert!(bar.inset_with_loss(0.41).1 > 0.1, "{}", bar.inset_with_loss(0.41).1);
+        // A smooth outline with short sides keeps its thickness too.
+        let wavy: Vec<[f64; 2]> = (0..600)
+            .map(|i| {
+                let angle = f64::from(i) * TAU / 600.0;
+                let radius = 15.0 + 0.5 * (9.0 * angle).sin();
+                [radius * angle.cos(), radius * angle.sin()]
+            })
+            .collect();
+        assert!(region(&[wavy]).inset_with_loss(0.9).1.abs() < 1e-3);
     }
 
     #[test]

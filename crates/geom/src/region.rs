@@ -205,13 +205,18 @@ impl Region {
         Self::from_grid_rings(&rings, Fill::Positive)
     }
 
+    /// Returns the islands that `keep` accepts.
+    #[must_use]
+    pub fn filtered(&self, keep: impl Fn(&&Island) -> bool) -> Self {
+        Self { islands: self.islands.iter().filter(keep).cloned().collect() }
+    }
+
     /// Returns the region without the islands smaller than `least_area` (mm²).
     #[must_use]
     pub fn without_small_islands(&self, least_area: f64) -> Self {
-        let keep = |island: &&Island| {
+        self.filtered(|island| {
             island.iter().map(|ring| signed_area(ring)).sum::<f64>() >= least_area
-        };
-        Self { islands: self.islands.iter().filter(keep).cloned().collect() }
+        })
     }
 
     /// Returns whether the point (mm) lies inside; undecided exactly on a ring.

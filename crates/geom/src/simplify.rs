@@ -11,11 +11,12 @@ use nalgebra::Point2;
 
 use crate::grid::{GridPoint, steps};
 
-/// Returns the indices of the points of an open line to keep; ends always stay.
+/// Marks the points of an open line that must stay so that none of the others lies farther than
+/// the limit from the line that is left; both ends are taken to stay.
 ///
 /// `distance_squared(a, b, p)` is the squared distance of point `p` from the segment `a`–`b`, all
-/// three by index.
-fn kept(
+/// three by index: the points may be of any kind, such as positions with a width.
+pub fn mark_kept(
     first: usize,
     last: usize,
     limit_squared: f64,
@@ -62,8 +63,8 @@ pub fn simplify_ring(ring: &[GridPoint], tolerance: f64) -> Vec<GridPoint> {
     let mut keep = vec![false; points.len()];
     keep[0] = true;
     keep[far] = true;
-    kept(0, far, limit, distance, &mut keep);
-    kept(far, points.len() - 1, limit, distance, &mut keep);
+    mark_kept(0, far, limit, distance, &mut keep);
+    mark_kept(far, points.len() - 1, limit, distance, &mut keep);
     let result: Vec<GridPoint> =
         points.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(p, _)| *p).collect();
     // Two anchors and nothing between: the ring is a sliver thinner than the tolerance.
@@ -81,7 +82,7 @@ pub fn simplify_line(points: &[Point2<f64>], tolerance: f64) -> Vec<Point2<f64>>
     let mut keep = vec![false; points.len()];
     keep[0] = true;
     keep[points.len() - 1] = true;
-    kept(0, points.len() - 1, tolerance * tolerance, distance, &mut keep);
+    mark_kept(0, points.len() - 1, tolerance * tolerance, distance, &mut keep);
     points.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(p, _)| *p).collect()
 }
 

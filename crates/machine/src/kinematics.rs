@@ -83,7 +83,7 @@ impl Alignment {
         let nozzle =
             Vector2::new(joints.s + self.a + self.a1 * joints.z, self.b + self.b1 * joints.z);
         let over_bed = Rotation2::new(joints.turn.radians()) * nozzle;
-        let part = Rotation2::new(-self.plate_angle) * (over_bed - self.plate_offset);
+        let part = self.part_from_bed(&over_bed);
         Point3::new(part.x, part.y, joints.z)
     }
 
@@ -118,6 +118,12 @@ impl Alignment {
     #[must_use]
     pub fn over_bed(&self, part: &Point2<f64>) -> Vector2<f64> {
         self.plate_offset + Rotation2::new(self.plate_angle) * part.coords
+    }
+
+    /// Returns the point of the part that lies on a point of the bed, seen from the axis.
+    #[must_use]
+    pub fn part_from_bed(&self, over_bed: &Vector2<f64>) -> Point2<f64> {
+        Point2::from(Rotation2::new(-self.plate_angle) * (over_bed - self.plate_offset))
     }
 }
 

@@ -19,7 +19,7 @@ fn number(value: &Value, key: &str) -> f64 {
 }
 
 fn alignment(models: &Value, name: &Value) -> Alignment {
-    let model = &models[name.as_str().unwrap()];
+    let model = &models[name.as_str().expect("models go by name")];
     Alignment {
         a: number(model, "a"),
         b: number(model, "b"),

@@ -1,1 +1,22 @@
-//! plan
+//! Toolpaths and a machine become a motion program.
+//!
+//! This is the only crate that knows both arms of rhumb: where material goes (`slicer`) and what
+//! the machine can do (`machine`). In the order of the data: [`order`] says which line comes after
+//! which and [`seam`] where closed ones begin; [`route`] puts travel, retraction and lift between
+//! them; [`axis`] bends what would graze the rotation axis and [`resample`] turns strokes over the
+//! part into joint moves; [`speed`] finds the durations that the axes can keep, [`cooling`]
+//! stretches short layers, [`time`] estimates how long the print takes; [`planner`] runs it all,
+//! layer by layer.
+
+pub mod axis;
+pub mod cooling;
+pub mod order;
+pub mod planner;
+pub mod resample;
+pub mod route;
+pub mod seam;
+pub mod speed;
+pub mod time;
+
+#[cfg(test)]
+mod testing;

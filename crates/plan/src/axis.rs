@@ -1,0 +1,145 @@
+//! Ways that keep clear of the rotation axis.
+//!
+//! Near the axis a straight line asks for a bed speed of `v/d`; through it, for a half turn in no
+//! time, and firmwares abort or jerk. A way that would enter the disc of the clearance goes in up to
+//! its rim, round it on the nearer side, and out.
+//!
+//! All points are on the bed, mm from the axis.
+
+use nalgebra::{Point2, Vector2, distance};
+
+/// A piece of a way that keeps clear.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Piece {
+    /// Straight to a point.
+    Line(Point2<f64>),
+    /// Round the axis at the clearance, by this angle (radians, counter-clockwise positive), to a
+    /// point.
+    Arc(f64, Point2<f64>),
+}
+
+impl Piece {
+    /// Where it ends.
+    #[must_use]
+    pub fn end(&self) -> Point2<f64> {
+        match self {
+            Self::Line(to) | Self::Arc(_, to) => *to,
+        }
+    }
+}
+
+/// How much nearer than the clearance a line may pass by rounding, as a share of it.
+const SLACK: f64 = 1e-9;
+
+/// Returns the point itself, or the one on the rim of the clearance in its direction; `from`
+/// decides for a point on the axis.
+#[must_use]
+pub fn outside(p: Point2<f64>, from: Point2<f64>, clearance: f64) -> Point2<f64> {
+    let radius = p.coords.norm();
+    if radius >= clearance {
+        return p;
+    }
+    let direction = if radius > 0.0 { p.coords } else { from.coords };
+    match direction.try_normalize(0.0) {
+        Some(unit) => Point2::from(unit * clearance),
+        None => Point2::new(clearance, 0.0),
+    }
+}
+
+/// Returns the distance of the segment `a`–`b` from the axis.
+#[must_use]
+pub fn distance_to_axis(a: &Point2<f64>, b: &Point2<f64>) -> f64 {
+    geom::polyline::distance_to_segment(a, b, &Point2::origin())
+}
+
+/// Returns the way from `a` to `b`, which both must lie outside of the clearance or on its rim.
+#[must_use]
+pub fn keep_clear(a: &Point2<f64>, b: &Point2<f64>, clearance: f64) -> Vec<Piece> {
+    if distance_to_axis(a, b) >= clearance * (1.0 - SLACK) {
+        return vec![Piece::Line(*b)];
+    }
+    let unit = (b - a).normalize();
+    let along = -a.coords.dot(&unit);
+    let foot = a + unit * along;
+    let half_chord = (clearance * clearance - foot.coords.norm_squared()).max(0.0).sqrt();
+    let entry = on_rim(foot - unit * half_chord, clearance);
+    let exit = on_rim(foot + unit * half_chord, clearance);
+    // Round the side on which the line passes; exactly through the middle, counter-clockwise.
+    let sweep = entry.coords.perp(&exit.coords).atan2(entry.coords.dot(&exit.coords));
+    let passes_left = unit.perp(&(Point2::origin() - foot)) > 0.0;
+    let sweep = if sweep.abs() > std::f64::consts::PI - SLACK {
+        sweep.abs() * if passes_left || foot.coords == Vector2::zeros() { 1.0 } else { -1.0 }
+    } else {
+        sweep
+    };
+    let mut pieces = Vec::with_capacity(3);
+    if distance(a, &entry) > clearance * SLACK {
+        pieces.push(Piece::Line(entry));
+    }
+    pieces.push(Piece::Arc(sweep, exit));
+    if distance(&exit, b) > clearance * SLACK {
+        pieces.push(Piece::Line(*b));
+    }
+    pieces
+}
+
+fn on_rim(p: Point2<f64>, clearance: f64) -> Point2<f64> {
+    Point2::from(p.coords.normalize() * clearance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    fn points(way: &[Piece], from: Point2<f64>) -> Vec<Point2<f64>> {
+        let mut list = vec![from];
+        for piece in way {
+            if let Piece::Arc(sweep, _) = piece {
+                let start = list.last().unwrap().coords;
+                for k in 1..=32 {
+                    let angle = sweep * f64::from(k) / 32.0;
+                    list.push(Point2::from(nalgebra::Rotation2::new(angle) * start));
+                }
+            }
+            list.push(piece.end());
+        }
+        list
+    }
+
+    #[test]
+    fn far_lines_are_left_alone() {
+        let (a, b) = (Point2::new(-5.0, 1.0), Point2::new(5.0, 1.0));
+        assert_eq!(keep_clear(&a, &b, 0.5), [Piece::Line(b)]);
+        assert_eq!(keep_clear(&a, &Point2::new(-2.0, 0.1), 0.5).len(), 1, "it ends before");
+    }
+
+    #[test]
+    fn no_way_comes_nearer_than_the_clearance() {
+        for k in 0..200 {
+            let angle = f64::from(k) * 0.37;
+            let offset = f64::from(k % 21 - 10) * 0.05;
+            let unit = Vector2::new(angle.cos(), angle.sin());
+            let side = Vector2::new(-unit.y, unit.x) * offset;
+            let (a, b) = (Point2::from(side - unit * 4.0), Point2::from(side + unit * 7.0));
+            let way = keep_clear(&a, &b, 0.4);
+            for p in points(&way, a) {
+                assert!(p.coords.norm() >= 0.4 * (1.0 - 1e-6), "offset {offset}: {p}");
+            }
+            assert_eq!(way.last().unwrap().end(), b);
+            // It passes on the side of the line, which is the shorter one.
+            if let Some(Piece::Arc(sweep, _)) = way.iter().find(|p| matches!(p, Piece::Arc(..))) {
+                assert!(sweep.abs() <= PI + 1e-9 && (offset == 0.0 || sweep * offset < 0.0));
+            }
+        }
+    }
+
+    #[test]
+    fn points_inside_move_to_the_rim() {
+        let from = Point2::new(3.0, 4.0);
+        assert_eq!(outside(from, from, 0.5), from);
+        assert!((outside(Point2::new(0.1, 0.0), from, 0.5) - Point2::new(0.5, 0.0)).norm() < 1e-12);
+        assert!((outside(Point2::origin(), from, 0.5) - Point2::new(0.3, 0.4)).norm() < 1e-12);
+        assert_eq!(outside(Point2::origin(), Point2::origin(), 0.5), Point2::new(0.5, 0.0));
+    }
+}

@@ -1,0 +1,376 @@
+//! Which line comes after which.
+//!
+//! Islands, and the walls and fills in each, are visited by nearest neighbour: walls first, from
+//! the inside out (or the outside in), then infill. Fills can be run either way; their order is
+//! then improved by reversing stretches of it while that shortens the travel (2-opt).
+
+use geom::polyline::nearest_on_ring;
+use nalgebra::{Point2, Point3, distance};
+use slicer::bead::Bead;
+use slicer::toolpath::{IslandPaths, LayerPaths, Role, Station, Toolpath, WallGroup};
+
+use crate::seam::{SeamMemory, SeamPosition, nearest};
+
+/// How lines are put in order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrderParams {
+    /// Where walls begin.
+    pub seam: SeamPosition,
+    /// Whether the external wall comes before those behind it.
+    pub external_first: bool,
+}
+
+/// A line in the order and direction in which it is laid; closed ones end where they begin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrderedLine {
+    /// What it is for.
+    pub role: Role,
+    /// Its stations; the first and the last of a closed line coincide.
+    pub stations: Vec<Station>,
+    /// The island it belongs to, by index in the layer; `None` for skirt and brim.
+    pub island: Option<usize>,
+}
+
+/// Puts the lines of a layer in order, beginning at `nozzle`.
+#[must_use]
+pub fn order(
+    layer: &LayerPaths,
+    nozzle: Point2<f64>,
+    seams: &mut SeamMemory,
+    params: &OrderParams,
+) -> Vec<OrderedLine> {
+    seams.next_layer();
+    let mut ordering = Ordering { nozzle, seams, params, lines: Vec::new(), island: None };
+    for path in &layer.adhesion {
+        ordering.closed_from_nearest(path);
+    }
+    let mut left: Vec<usize> = (0..layer.islands.len()).collect();
+    while !left.is_empty() {
+        let (k, _) = left
+            .iter()
+            .map(|&island| distance_to_island(&layer.islands[island], &ordering.nozzle))
+            .enumerate()
+            .min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))
+            .expect("islands are left");
+        let index = left.remove(k);
+        ordering.island = Some(index);
+        ordering.island(&layer.islands[index]);
+    }
+    ordering.lines
+}
+
+fn distance_to_island(island: &IslandPaths, from: &Point2<f64>) -> f64 {
+    let external = island.walls.iter().filter_map(|group| group.loops.first());
+    external
+        .chain(&island.fills)
+        .flat_map(|path| &path.stations)
+        .map(|station| distance(&station.at.xy(), from))
+        .fold(f64::INFINITY, f64::min)
+}
+
+struct Ordering<'a> {
+    nozzle: Point2<f64>,
+    seams: &'a mut SeamMemory,
+    params: &'a OrderParams,
+    lines: Vec<OrderedLine>,
+    island: Option<usize>,
+}
+
+impl Ordering<'_> {
+    fn island(&mut self, island: &IslandPaths) {
+        let mut groups: Vec<&WallGroup> =
+            island.walls.iter().filter(|group| !group.loops.is_empty()).collect();
+        while !groups.is_empty() {
+            let k = groups
+                .iter()
+                .map(|group| nearest(&plane(&group.loops[0]), &self.nozzle).1)
+                .enumerate()
+                .min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))
+                .map_or(0, |(k, _)| k);
+            self.walls(groups.remove(k));
+        }
+        for (fill, reversed) in tour(&island.fills, self.nozzle) {
+            self.fill(fill, reversed);
+        }
+    }
+
+    /// The walls along one outline, all begun next to the seam of the external one.
+    fn walls(&mut self, group: &WallGroup) {
+        let external = &group.loops[0];
+        let seam = self.seams.choose(&plane(external), &self.nozzle, self.params.seam);
+        let seam_at = external.stations[seam].at.xy();
+        let behind = group.loops[1..].iter().map(|path| begun_near(path, &seam_at));
+        let mut lines: Vec<OrderedLine> =
+            std::iter::once(begun_at(external, seam)).chain(behind).collect();
+        if !self.params.external_first {
+            lines.reverse();
+        }
+        for line in lines {
+            self.push(line);
+        }
+    }
+
+    fn fill(&mut self, fill: &Toolpath, reversed: bool) {
+        if fill.closed {
+            self.closed_from_nearest(fill);
+            return;
+        }
+        let mut stations = fill.stations.clone();
+        if reversed {
+            stations.reverse();
+        }
+        self.push(OrderedLine { role: fill.role, stations, island: None });
+    }
+
+    fn closed_from_nearest(&mut self, path: &Toolpath) {
+        let (start, _) = nearest(&plane(path), &self.nozzle);
+        self.push(begun_at(path, start));
+    }
+
+    fn push(&mut self, line: OrderedLine) {
+        if let Some(last) = line.stations.last() {
+            self.nozzle = last.at.xy();
+        }
+        self.lines.push(OrderedLine { island: self.island, ..line });
+    }
+}
+
+fn plane(path: &Toolpath) -> Vec<Point2<f64>> {
+    path.stations.iter().map(|station| station.at.xy()).collect()
+}
+
+/// A closed line begun at one of its stations.
+fn begun_at(path: &Toolpath, start: usize) -> OrderedLine {
+    let mut stations: Vec<Station> =
+        path.stations[start..].iter().chain(&path.stations[..=start]).copied().collect();
+    stations.dedup_by(|a, b| a.at == b.at && a.bead == b.bead);
+    OrderedLine { role: path.role, stations, island: None }
+}
+
+/// A closed line begun at the place on it nearest to `target`, on a side if need be.
+fn begun_near(path: &Toolpath, target: &Point2<f64>) -> OrderedLine {
+    let place = nearest_on_ring(&plane(path), target).expect("lines have points");
+    let (from, to) =
+        (path.stations[place.side], path.stations[(place.side + 1) % path.stations.len()]);
+    let blend = |a: f64, b: f64| a + (b - a) * place.share;
+    let start = Station {
+        at: Point3::from(from.at.coords.lerp(&to.at.coords, place.share)),
+        bead: Bead {
+            width: blend(from.bead.width, to.bead.width),
+            thickness: blend(from.bead.thickness, to.bead.thickness),
+        },
+    };
+    let next = place.side + 1;
+    let mut stations = vec![start];
+    stations.extend(path.stations[next..].iter().chain(&path.stations[..next]));
+    stations.push(start);
+    stations.dedup_by(|a, b| a.at == b.at);
+    OrderedLine { role: path.role, stations, island: None }
+}
+
+/// Above this many fills the improvement, which is quadratic, is left out.
+const MOST_IMPROVED: usize = 400;
+
+/// A gain smaller than this is rounding, mm; without a floor the improvement could go in circles.
+const LEAST_GAIN_MM: f64 = 1e-6;
+
+/// The order in which to lay fills, and whether each is reversed.
+fn tour(fills: &[Toolpath], start: Point2<f64>) -> Vec<(&Toolpath, bool)> {
+    let ends: Vec<[Point2<f64>; 2]> = fills
+        .iter()
+        .map(|fill| {
+            let first = fill.stations[0].at.xy();
+            let last = fill.stations[fill.stations.len() - 1].at.xy();
+            if fill.closed { [first, first] } else { [first, last] }
+        })
+        .collect();
+    let mut tour = by_nearest_neighbour(&ends, start);
+    if tour.len() <= MOST_IMPROVED {
+        improve(&mut tour, &ends, start);
+    }
+    tour.into_iter().map(|stop| (&fills[stop.fill], stop.reversed)).collect()
+}
+
+#[derive(Clone, Copy)]
+struct Stop {
+    fill: usize,
+    reversed: bool,
+}
+
+impl Stop {
+    fn entry(&self, ends: &[[Point2<f64>; 2]]) -> Point2<f64> {
+        ends[self.fill][usize::from(self.reversed)]
+    }
+
+    fn exit(&self, ends: &[[Point2<f64>; 2]]) -> Point2<f64> {
+        ends[self.fill][usize::from(!self.reversed)]
+    }
+}
+
+fn by_nearest_neighbour(ends: &[[Point2<f64>; 2]], start: Point2<f64>) -> Vec<Stop> {
+    let mut left: Vec<usize> = (0..ends.len()).collect();
+    let mut at = start;
+    let mut tour = Vec::with_capacity(ends.len());
+    while !left.is_empty() {
+        let mut best = (f64::INFINITY, 0, false);
+        for (k, &fill) in left.iter().enumerate() {
+            for reversed in [false, true] {
+                let gap = distance(&at, &ends[fill][usize::from(reversed)]);
+                if gap < best.0 {
+                    best = (gap, k, reversed);
+                }
+            }
+        }
+        // `remove` and not `swap_remove`: equal gaps are decided by the order of the fills.
+        let stop = Stop { fill: left.remove(best.1), reversed: best.2 };
+        at = stop.exit(ends);
+        tour.push(stop);
+    }
+    tour
+}
+
+/// Reverses stretches of the tour as long as that shortens it.
+fn improve(tour: &mut [Stop], ends: &[[Point2<f64>; 2]], start: Point2<f64>) {
+    let mut improved = true;
+    while improved {
+        improved = false;
+        for from in 0..tour.len() {
+            let before = if from == 0 { start } else { tour[from - 1].exit(ends) };
+            for to in from..tour.len() {
+                let gap = |a: Point2<f64>, b: Point2<f64>| distance(&a, &b);
+                let (first, last) = (tour[from], tour[to]);
+                let mut gain = gap(before, first.entry(ends)) - gap(before, last.exit(ends));
+                if let Some(after) = tour.get(to + 1) {
+                    gain += gap(last.exit(ends), after.entry(ends))
+                        - gap(first.entry(ends), after.entry(ends));
+                }
+                if gain > LEAST_GAIN_MM {
+                    tour[from..=to].reverse();
+                    for stop in &mut tour[from..=to] {
+                        stop.reversed = !stop.reversed;
+                    }
+                    improved = true;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BEAD: Bead = Bead { width: 0.45, thickness: 0.2 };
+
+    fn line(points: &[[f64; 2]], role: Role, closed: bool) -> Toolpath {
+        let stations = points
+            .iter()
+            .map(|p| Station { at: Point3::new(p[0], p[1], 0.2), bead: BEAD })
+            .collect();
+        Toolpath { role, closed, stations }
+    }
+
+    fn square(x: f64, y: f64, half: f64, role: Role) -> Toolpath {
+        let corners = [
+            [x - half, y - half],
+            [x + half, y - half],
+            [x + half, y + half],
+            [x - half, y + half],
+        ];
+        line(&corners, role, true)
+    }
+
+    fn ordered(layer: &LayerPaths, external_first: bool) -> Vec<OrderedLine> {
+        let params = OrderParams { seam: SeamPosition::Nearest, external_first };
+        order(layer, Point2::origin(), &mut SeamMemory::default(), &params)
+    }
+
+    #[test]
+    fn walls_from_the_inside_out_then_infill() {
+        let walls = WallGroup {
+            loops: vec![
+                square(0.0, 0.0, 5.0, Role::ExternalPerimeter),
+                square(0.0, 0.0, 4.6, Role::Perimeter),
+            ],
+        };
+        let fills = vec![line(&[[-3.0, 0.0], [3.0, 0.0]], Role::InternalInfill, false)];
+        let island = IslandPaths { walls: vec![walls], fills, ..IslandPaths::default() };
+        let layer = LayerPaths { islands: vec![island], ..LayerPaths::default() };
+        let roles = |first| ordered(&layer, first).iter().map(|l| l.role).collect::<Vec<_>>();
+        assert_eq!(roles(false), [Role::Perimeter, Role::ExternalPerimeter, Role::InternalInfill]);
+        assert_eq!(roles(true), [Role::ExternalPerimeter, Role::Perimeter, Role::InternalInfill]);
+        for line in &ordered(&layer, false)[..2] {
+            assert_eq!(line.stations.first().unwrap().at, line.stations.last().unwrap().at);
+        }
+    }
+
+    #[test]
+    fn inner_walls_begin_beside_the_seam() {
+        let walls = WallGroup {
+            loops: vec![
+                square(0.0, 0.0, 5.0, Role::ExternalPerimeter),
+                square(0.0, 0.0, 4.6, Role::Perimeter),
+            ],
+        };
+        let island = IslandPaths { walls: vec![walls], ..IslandPaths::default() };
+        let layer = LayerPaths { islands: vec![island], ..LayerPaths::default() };
+        let lines = ordered(&layer, false);
+        let gap = lines[1].stations[0].at - lines[0].stations.last().unwrap().at;
+        assert!(gap.norm() < 0.6, "{gap}");
+    }
+
+    #[test]
+    fn islands_are_visited_nearest_first() {
+        let island = |x: f64| IslandPaths {
+            fills: vec![line(&[[x, 0.0], [x + 1.0, 0.0]], Role::SolidInfill, false)],
+            ..IslandPaths::default()
+        };
+        let layer = LayerPaths {
+            islands: vec![island(50.0), island(10.0), island(30.0)],
+            ..Default::default()
+        };
+        let islands: Vec<_> = ordered(&layer, false).iter().map(|l| l.island).collect();
+        assert_eq!(islands, [Some(1), Some(2), Some(0)]);
+    }
+
+    #[test]
+    fn fills_are_run_in_either_direction_to_save_travel() {
+        let rows: Vec<Toolpath> = (0..6)
+            .map(|i| line(&[[0.0, f64::from(i)], [20.0, f64::from(i)]], Role::SolidInfill, false))
+            .collect();
+        let tour = tour(&rows, Point2::origin());
+        let reversed: Vec<bool> = tour.iter().map(|(_, reversed)| *reversed).collect();
+        assert_eq!(reversed, [false, true, false, true, false, true]);
+    }
+
+    #[test]
+    fn improvement_never_lengthens_the_travel() {
+        let mut state = 5_u64;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 33) as f64 / f64::from(1_u32 << 31) * 40.0
+        };
+        for _ in 0..20 {
+            let ends: Vec<[Point2<f64>; 2]> = (0..30)
+                .map(|_| [Point2::new(next(), next()), Point2::new(next(), next())])
+                .collect();
+            let travel = |tour: &[Stop]| {
+                let mut at = Point2::origin();
+                tour.iter()
+                    .map(|stop| {
+                        let gap = distance(&at, &stop.entry(&ends));
+                        at = stop.exit(&ends);
+                        gap
+                    })
+                    .sum::<f64>()
+            };
+            let greedy = by_nearest_neighbour(&ends, Point2::origin());
+            let mut better = greedy.clone();
+            improve(&mut better, &ends, Point2::origin());
+            assert!(travel(&better) <= travel(&greedy) + 1e-9);
+            let mut visited: Vec<usize> = better.iter().map(|stop| stop.fill).collect();
+            visited.sort_unstable();
+            assert_eq!(visited, (0..30).collect::<Vec<_>>());
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! The planner: one layer after the other becomes steps of the program.
+
+use machine::kinematics::Unreachable;
+use machine::profile::Printer;
+use machine::program::{Joints, Move, Role, Step};
+use nalgebra::Point3;
+use slicer::toolpath::LayerPaths;
+
+use crate::cooling::{CoolingParams, slow_down};
+use crate::order::{OrderParams, order};
+use crate::resample::{Leg, ResampleParams, Resampler};
+use crate::route::{FilamentParams, Item, Kind, Router, Speeds, Stroke};
+use crate::seam::SeamMemory;
+use crate::speed::{Limits, Pace, durations, travels};
+use crate::time;
+
+/// Choices of the plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanParams {
+    /// Which line comes after which.
+    pub order: OrderParams,
+    /// Speeds that are wanted.
+    pub speeds: Speeds,
+    /// How filament is fed.
+    pub filament: FilamentParams,
+    /// How closely moves follow lines.
+    pub resample: ResampleParams,
+    /// Least layer time.
+    pub cooling: CoolingParams,
+    /// Part fan and nozzle temperature.
+    pub heat: HeatParams,
+}
+
+/// Fan and temperature over the layers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeatParams {
+    /// Nozzle temperature of the first layer, °C; the start program sets it.
+    pub first_layer_temperature: f64,
+    /// Nozzle temperature of all others, °C.
+    pub temperature: f64,
+    /// Part fan, 0 to 1.
+    pub fan: f64,
+    /// Layers without fan at the bottom.
+    pub layers_without_fan: usize,
+}
+
+/// What a program amounts to.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Totals {
+    /// Estimated time, s.
+    pub time: f64,
+    /// Filament fed, less what is drawn back, mm.
+    pub filament: f64,
+    /// Volume laid by role, mm³, in the order of [`Role::ALL`].
+    pub volume: [f64; Role::ALL.len()],
+    /// Way without laying material, mm.
+    pub travel: f64,
+    /// Moves of the nozzle.
+    pub moves: usize,
+    /// Times that the filament is drawn back.
+    pub retractions: usize,
+    /// Turns of the bed, whichever way.
+    pub bed_turns: f64,
+}
+
+impl Totals {
+    /// Returns the volume laid, mm³.
+    #[must_use]
+    pub fn extruded(&self) -> f64 {
+        self.volume.iter().sum()
+    }
+}
+
+/// Why a layer cannot be planned.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("layer {layer}: {source}")]
+pub struct PlanError {
+    /// Counted from 0.
+    pub layer: usize,
+    /// What is out of reach.
+    #[source]
+    pub source: Unreachable,
+}
+
+/// Plans layer after layer. See the [module](self).
+pub struct Planner<'a> {
+    printer: &'a Printer,
+    params: PlanParams,
+    limits: Limits,
+    resampler: Resampler,
+    router: Router,
+    seams: SeamMemory,
+    pace: Pace,
+    totals: Totals,
+    role: Role,
+}
+
+impl<'a> Planner<'a> {
+    /// Returns a planner for a printer at its home position.
+    #[must_use]
+    pub fn new(printer: &'a Printer, params: PlanParams) -> Self {
+        let resampler = Resampler::new(printer, params.resample);
+        Self {
+            printer,
+            params,
+            limits: Limits::of(printer, !params.resample.straight_over_part),
+            router: Router::new(resampler.at(), printer.lift.speed),
+            resampler,
+            seams: SeamMemory::default(),
+            pace: Pace::REST,
+            totals: Totals::default(),
+            role: Role::Custom,
+        }
+    }
+
+    /// Plans the next layer.
+    ///
+    /// # Errors
+    ///
+    /// [`PlanError`] where a line comes nearer to the axis than the rail can.
+    pub fn layer(&mut self, layer: &LayerPaths) -> Result<Vec<Step>, PlanError> {
+        let nozzle = self.router.at().xy();
+        let lines = order(layer, nozzle, &mut self.seams, &self.params.order);
+        let items = self.router.layer(layer, &lines, &self.params.speeds, &self.params.filament);
+        let mut steps = self.heat(layer.index);
+        let planned =
+            self.lower(items).map_err(|source| PlanError { layer: layer.index, source })?;
+        steps.extend(planned);
+        Ok(steps)
+    }
+
+    /// Plans the end: filament back, nozzle up and out of the way.
+    ///
+    /// # Errors
+    ///
+    /// [`PlanError`], which cannot occur after a layer that was planned.
+    pub fn finish(mut self) -> Result<(Vec<Step>, Totals), PlanError> {
+        const CLEARANCE_MM: f64 = 5.0;
+        let lift = CLEARANCE_MM.min(self.printer.lift.max - self.router.at().z).max(0.0);
+        let items = self.router.leave(lift, &self.params.filament);
+        let fail = |source| PlanError { layer: 0, source };
+        let mut steps = self.lower(items).map_err(fail)?;
+        let from = self.resampler.joints();
+        let to = Joints { s: self.printer.home.s, ..from };
+        let path = (to.s - from.s).abs();
+        if path > 0.0 {
+            let at = self.printer.alignment.part_from_joints(&to);
+            let speed = self.params.speeds.travel;
+            let leg = Leg { kind: Kind::Travel, to, at, filament: 0.0, path, speed };
+            steps.extend(self.timed(vec![vec![leg]], from).into_iter().flatten());
+        }
+        Ok((steps, self.totals))
+    }
+
+    fn heat(&self, index: usize) -> Vec<Step> {
+        let heat = &self.params.heat;
+        let mut steps = Vec::new();
+        if index == 1 && heat.temperature != heat.first_layer_temperature {
+            let celsius = machine::gcode::decimal(heat.temperature, 0);
+            steps.push(Step::Custom(format!("M104 S{celsius}")));
+        }
+        if index == heat.layers_without_fan && heat.fan > 0.0 {
+            steps.push(Step::Fan(heat.fan));
+        }
+        steps
+    }
+
+    /// Turns strokes into timed moves, in their places between the other steps.
+    fn lower(&mut self, items: Vec<Item>) -> Result<Vec<Step>, Unreachable> {
+        let strokes: Vec<Stroke> = items
+            .iter()
+            .filter_map(|item| match item {
+                Item::Stroke(stroke) => Some(*stroke),
+                Item::Step(_) => None,
+            })
+            .collect();
+        let start = self.resampler.joints();
+        let legs = self.resampler.legs(&strokes)?;
+        let mut moves = self.timed_by_role(legs, start, &items).into_iter();
+        let mut steps = Vec::new();
+        for item in items {
+            match item {
+                Item::Step(step) => steps.push(step),
+                Item::Stroke(_) => steps.extend(moves.next().into_iter().flatten()),
+            }
+        }
+        Ok(steps)
+    }
+
+    /// Like [`timed`](Self::timed), with the volume counted by role.
+    fn timed_by_role(
+        &mut self,
+        legs: Vec<Vec<Leg>>,
+        start: Joints,
+        items: &[Item],
+    ) -> Vec<Vec<Step>> {
+        let mut groups = legs.iter();
+        for item in items {
+            match item {
+                Item::Step(Step::Bead(role, _)) => self.role = *role,
+                Item::Step(_) => {}
+                Item::Stroke(_) => {
+                    let fed: f64 = groups
+                        .next()
+                        .into_iter()
+                        .flatten()
+                        .filter(|leg| leg.kind == Kind::Print)
+                        .map(|leg| leg.filament)
+                        .sum();
+                    let place = Role::ALL.iter().position(|role| *role == self.role);
+                    self.totals.volume[place.expect("all roles are listed")] +=
+                        fed * self.params.filament.area;
+                }
+            }
+        }
+        self.timed(legs, start)
+    }
+
+    /// Gives every leg its duration.
+    fn timed(&mut self, groups: Vec<Vec<Leg>>, start: Joints) -> Vec<Vec<Step>> {
+        let sizes: Vec<usize> = groups.iter().map(Vec::len).collect();
+        let mut legs: Vec<Leg> = groups.into_iter().flatten().collect();
+        let travels = travels(&legs, start);
+        let (mut times, mut pace) = durations(&legs, &travels, self.pace, &self.limits);
+        if slow_down(&mut legs, &times, &self.params.cooling) {
+            (times, pace) = durations(&legs, &travels, self.pace, &self.limits);
+        }
+        self.pace = pace;
+        self.totals.time += time::estimate(&legs, &travels, &times, self.printer);
+        for (leg, travel) in legs.iter().zip(&travels) {
+            self.count(leg, travel.axes[1]);
+        }
+        let mut timed = legs.iter().zip(times).map(|(leg, duration)| {
+            Step::Move(Move {
+                to: leg.to,
+                at: leg.at,
+                filament: leg.filament,
+                path: leg.path,
+                duration,
+            })
+        });
+        sizes.iter().map(|&size| timed.by_ref().take(size).collect()).collect()
+    }
+
+    fn count(&mut self, leg: &Leg, turned: f64) {
+        self.totals.filament += leg.filament;
+        self.totals.bed_turns += turned.abs() / std::f64::consts::TAU;
+        match leg.kind {
+            Kind::Print => self.totals.moves += 1,
+            Kind::Travel => {
+                self.totals.moves += 1;
+                self.totals.travel += leg.path;
+            }
+            Kind::Filament => {
+                self.totals.retractions += usize::from(leg.filament < 0.0);
+            }
+        }
+    }
+
+    /// Returns where the nozzle stands, in the slicer's frame.
+    #[must_use]
+    pub fn at(&self) -> Point3<f64> {
+        self.router.at()
+    }
+}

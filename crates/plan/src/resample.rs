@@ -1,0 +1,549 @@
+//! Strokes over the part become moves of the joints.
+//!
+//! A move is straight in joint space, which over the part is a piece of a spiral. A stroke is halved
+//! until every piece lies within the chord tolerance of it: the deviation is measured with the
+//! forward kinematics at a quarter, half and three quarters of the piece, and the bed turns by at
+//! most 60° in one move (the rule of the calibration's derivation; any alignment is covered, at the
+//! price of up to 1.8 times the least possible number of moves).
+//!
+//! Ways that would come too near to the axis are bent round it ([`axis`](crate::axis)). Where the
+//! carriage can pass the centre, a stroke that runs through the axis to within the chord tolerance
+//! is one move to the other side of the rail, and the bed does not turn at all; what follows is
+//! then laid from the far side, as far as the rail reaches.
+
+use machine::kinematics::{Alignment, Branch, Unreachable};
+use machine::profile::Printer;
+use machine::program::{BedTurn, Joints};
+use nalgebra::{Point2, Point3, Rotation2};
+
+use crate::axis::{Piece, distance_to_axis, keep_clear, outside};
+use crate::route::{Kind, Stroke};
+
+/// How closely moves follow strokes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResampleParams {
+    /// Greatest distance of an extruding move from its stroke, mm.
+    pub chord: f64,
+    /// The same for travel, mm.
+    pub travel_chord: f64,
+    /// Whether moves are straight over the part instead of in joint space.
+    pub straight_over_part: bool,
+    /// Angle by which the slicer's frame is turned on the bed, radians.
+    pub azimuth: f64,
+}
+
+/// A move whose duration is still open.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Leg {
+    /// What it does.
+    pub kind: Kind,
+    /// Where the axes end up.
+    pub to: Joints,
+    /// Where the nozzle then stands in the part, mm.
+    pub at: Point3<f64>,
+    /// Filament fed, mm.
+    pub filament: f64,
+    /// Length of the nozzle's path over the part, mm.
+    pub path: f64,
+    /// The speed that is wanted, mm/s.
+    pub speed: f64,
+}
+
+/// Largest turn of the bed in one move, radians: 60°.
+const LARGEST_TURN: f64 = std::f64::consts::FRAC_PI_3;
+
+/// Turn of the bed in one move round the axis, radians: 15°. Small enough that chord and arc, by
+/// which readers of a program measure speed, differ by less than a third of a percent, and that
+/// the bed can be sped up and braked in steps.
+const ARC_STEP: f64 = 0.262;
+
+/// Halvings after which a piece is taken as it is; 2⁻⁴⁰ of any stroke is far below a step.
+const MOST_HALVINGS: u32 = 40;
+
+/// Turns strokes into legs; remembers where the joints stand.
+#[derive(Debug, Clone)]
+pub struct Resampler {
+    alignment: Alignment,
+    params: ResampleParams,
+    clearance: f64,
+    /// How far from the axis the far side of the rail reaches, mm; negative when it does not.
+    far_reach: f64,
+    joints: Joints,
+    branch: Branch,
+    /// Where the nozzle stands over the bed; not always where the last stroke ended.
+    over_bed: Point2<f64>,
+}
+
+/// Where the nozzle is to be, over the bed.
+#[derive(Clone, Copy)]
+struct Target {
+    over_bed: Point2<f64>,
+    z: f64,
+}
+
+impl Resampler {
+    /// Returns a resampler for a printer that stands at its home position.
+    #[must_use]
+    pub fn new(printer: &Printer, params: ResampleParams) -> Self {
+        let at = printer.alignment.part_from_joints(&printer.home);
+        Self {
+            alignment: printer.alignment,
+            params,
+            clearance: printer.axis_clearance,
+            far_reach: -printer.rail.min,
+            joints: printer.home,
+            branch: Branch::Near,
+            over_bed: Point2::from(printer.alignment.over_bed(&at.xy())),
+        }
+    }
+
+    /// Where the joints stand.
+    #[must_use]
+    pub fn joints(&self) -> Joints {
+        self.joints
+    }
+
+    /// Returns where the nozzle stands, in the slicer's frame.
+    #[must_use]
+    pub fn at(&self) -> Point3<f64> {
+        let part = self.alignment.part_from_joints(&self.joints);
+        Rotation2d(-self.params.azimuth).turn(&part)
+    }
+
+    /// Returns the legs of consecutive strokes.
+    ///
+    /// # Errors
+    ///
+    /// [`Unreachable`] where the rail misses the axis by more than a stroke keeps from it.
+    pub fn legs(&mut self, strokes: &[Stroke]) -> Result<Vec<Vec<Leg>>, Unreachable> {
+        let mut all = Vec::with_capacity(strokes.len());
+        for (index, stroke) in strokes.iter().enumerate() {
+            let at = Rotation2d(self.params.azimuth).turn(&stroke.to);
+            let target = Target {
+                over_bed: Point2::from(self.alignment.over_bed(&at.xy())),
+                z: stroke.to.z,
+            };
+            let mut legs = Vec::new();
+            if self.params.straight_over_part {
+                self.straight(stroke, at, &mut legs);
+            } else if stroke.kind == Kind::Filament || target.over_bed == self.over_bed {
+                self.standing(stroke, target.z, &mut legs);
+            } else {
+                self.across(strokes, index, target, &mut legs)?;
+            }
+            all.push(legs);
+        }
+        Ok(all)
+    }
+
+    /// A stroke in a dialect whose moves are straight over the part.
+    fn straight(&mut self, stroke: &Stroke, at: Point3<f64>, legs: &mut Vec<Leg>) {
+        let here = self.alignment.part_from_joints(&self.joints);
+        // Joints are a courtesy here; where the rail cannot follow, they stay.
+        self.joints = self
+            .alignment
+            .joints_from_part(&at, Branch::Near, self.joints.turn)
+            .unwrap_or(Joints { z: at.z, ..self.joints });
+        let from = if stroke.kind == Kind::Filament { at } else { here };
+        legs.push(Leg {
+            kind: stroke.kind,
+            to: self.joints,
+            at,
+            filament: stroke.filament,
+            path: (at - from).norm(),
+            speed: stroke.speed,
+        });
+    }
+
+    /// A stroke that moves the lift or the filament only.
+    fn standing(&mut self, stroke: &Stroke, z: f64, legs: &mut Vec<Leg>) {
+        let path = if stroke.kind == Kind::Filament { 0.0 } else { (z - self.joints.z).abs() };
+        self.joints.z = z;
+        legs.push(Leg {
+            kind: stroke.kind,
+            to: self.joints,
+            at: self.alignment.part_from_joints(&self.joints),
+            filament: stroke.filament,
+            path,
+            speed: stroke.speed,
+        });
+    }
+
+    /// A stroke across the bed.
+    fn across(
+        &mut self,
+        strokes: &[Stroke],
+        index: usize,
+        target: Target,
+        legs: &mut Vec<Leg>,
+    ) -> Result<(), Unreachable> {
+        let stroke = &strokes[index];
+        let first = legs.len();
+        if self.passes_through(strokes, index, &target) {
+            self.branch = self.branch.opposite();
+            self.single(stroke.kind, &target, legs)?;
+        } else if stroke.kind == Kind::Travel && !self.reaches_run(strokes, index, self.branch) {
+            // Back to the side from which everything can be reached.
+            self.branch = Branch::Near;
+            self.single(stroke.kind, &target, legs)?;
+        } else {
+            self.clear_of_axis(stroke.kind, &target, legs)?;
+        }
+        // The stroke's filament is spread over its legs by length.
+        let length: f64 = legs[first..].iter().map(|leg| leg.path).sum();
+        for leg in &mut legs[first..] {
+            leg.filament = stroke.filament * leg.path / length;
+            leg.speed = stroke.speed;
+        }
+        Ok(())
+    }
+
+    /// Follows a stroke on the present side of the rail, round the axis where need be.
+    fn clear_of_axis(
+        &mut self,
+        kind: Kind,
+        target: &Target,
+        legs: &mut Vec<Leg>,
+    ) -> Result<(), Unreachable> {
+        let from = Target {
+            over_bed: outside(self.over_bed, target.over_bed, self.clearance),
+            z: self.joints.z,
+        };
+        let goal = outside(target.over_bed, from.over_bed, self.clearance);
+        let way = keep_clear(&from.over_bed, &goal, self.clearance);
+        let lengths = way_lengths(&way, from.over_bed, self.clearance);
+        let whole: f64 = lengths.iter().sum();
+        for (k, piece) in way.iter().enumerate() {
+            // What is left of the way decides, so that the end is exactly at the target.
+            let left: f64 = lengths[k + 1..].iter().sum();
+            let z =
+                if left > 0.0 { target.z - (target.z - from.z) * left / whole } else { target.z };
+            match piece {
+                Piece::Line(to) => {
+                    let tolerance = if kind == Kind::Print {
+                        self.params.chord
+                    } else {
+                        self.params.travel_chord
+                    };
+                    self.line(kind, &Target { over_bed: *to, z }, tolerance, 0, legs)?;
+                }
+                Piece::Arc(sweep, to) => {
+                    self.arc(kind, *sweep, &Target { over_bed: *to, z }, legs)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A straight piece, halved until its moves are near enough to it.
+    fn line(
+        &mut self,
+        kind: Kind,
+        target: &Target,
+        tolerance: f64,
+        halvings: u32,
+        legs: &mut Vec<Leg>,
+    ) -> Result<(), Unreachable> {
+        let to = self.joints_at(target)?;
+        if halvings < MOST_HALVINGS && !self.is_near_enough(&to, target, tolerance) {
+            let middle = Target {
+                over_bed: nalgebra::center(&self.over_bed, &target.over_bed),
+                z: f64::midpoint(self.joints.z, target.z),
+            };
+            self.line(kind, &middle, tolerance, halvings + 1, legs)?;
+            return self.line(kind, target, tolerance, halvings + 1, legs);
+        }
+        self.push(kind, to, target, legs);
+        Ok(())
+    }
+
+    /// Whether the move to `to` stays within the tolerance of the straight line to `target`.
+    fn is_near_enough(&self, to: &Joints, target: &Target, tolerance: f64) -> bool {
+        let turn = to.turn.radians() - self.joints.turn.radians();
+        if turn.abs() > LARGEST_TURN {
+            return false;
+        }
+        let along = target.over_bed - self.over_bed;
+        let length = along.norm();
+        if length <= tolerance {
+            return true;
+        }
+        let unit = along / length;
+        [0.25, 0.5, 0.75].into_iter().all(|share| {
+            let p = self.over_bed_at(&between(&self.joints, to, share));
+            unit.perp(&(p - self.over_bed)).abs() <= tolerance
+        })
+    }
+
+    /// A piece of a circle about the axis.
+    fn arc(
+        &mut self,
+        kind: Kind,
+        sweep: f64,
+        target: &Target,
+        legs: &mut Vec<Leg>,
+    ) -> Result<(), Unreachable> {
+        let start = self.over_bed.coords;
+        let rise = target.z - self.joints.z;
+        let base = self.joints.z;
+        let pieces = (sweep.abs() / ARC_STEP).ceil().max(1.0) as u32;
+        for k in 1..=pieces {
+            let share = f64::from(k) / f64::from(pieces);
+            let over_bed = if k == pieces {
+                target.over_bed
+            } else {
+                Point2::from(Rotation2::new(sweep * share) * start)
+            };
+            let step = Target { over_bed, z: base + rise * share };
+            let to = self.joints_at(&step)?;
+            self.push(kind, to, &step, legs);
+        }
+        Ok(())
+    }
+
+    /// One move straight in joint space, wherever that runs over the part.
+    fn single(
+        &mut self,
+        kind: Kind,
+        target: &Target,
+        legs: &mut Vec<Leg>,
+    ) -> Result<(), Unreachable> {
+        let to = self.joints_at(target)?;
+        self.push(kind, to, target, legs);
+        Ok(())
+    }
+
+    fn push(&mut self, kind: Kind, to: Joints, target: &Target, legs: &mut Vec<Leg>) {
+        let path = self.path_length(&to);
+        if path == 0.0 {
+            return;
+        }
+        self.joints = to;
+        self.over_bed = target.over_bed;
+        let at = self.alignment.part_from_joints(&to);
+        legs.push(Leg { kind, to, at, filament: 0.0, path, speed: 0.0 });
+    }
+
+    /// Length of the way of the nozzle over the part in one move.
+    fn path_length(&self, to: &Joints) -> f64 {
+        let turn = (to.turn.radians() - self.joints.turn.radians()).abs();
+        // Below a tenth of a radian arc and chord agree to 0.04 %.
+        let pieces = (turn / 0.1).ceil().clamp(1.0, 1000.0) as u32;
+        let mut from = self.alignment.part_from_joints(&self.joints);
+        (1..=pieces)
+            .map(|k| {
+                let joints = between(&self.joints, to, f64::from(k) / f64::from(pieces));
+                let next = self.alignment.part_from_joints(&joints);
+                let length = (next - from).norm();
+                from = next;
+                length
+            })
+            .sum()
+    }
+
+    fn joints_at(&self, target: &Target) -> Result<Joints, Unreachable> {
+        let part = self.alignment.part_from_bed(&target.over_bed.coords);
+        let part = Point3::new(part.x, part.y, target.z);
+        self.alignment.joints_from_part(&part, self.branch, self.joints.turn)
+    }
+
+    fn over_bed_at(&self, joints: &Joints) -> Point2<f64> {
+        Point2::from(self.alignment.over_bed(&self.alignment.part_from_joints(joints).xy()))
+    }
+
+    /// Whether a stroke runs through the axis, and the rail reaches what follows from the other
+    /// side.
+    fn passes_through(&self, strokes: &[Stroke], index: usize, target: &Target) -> bool {
+        if self.far_reach <= 0.0 {
+            return false;
+        }
+        let (a, b) = (self.over_bed, target.over_bed);
+        // A pass needs room on both sides, or it is an end on the axis.
+        let room = 2.0 * self.params.chord;
+        distance_to_axis(&a, &b) <= self.params.chord
+            && a.coords.norm() > room
+            && b.coords.norm() > room
+            && a.coords.dot(&b.coords) < 0.0
+            && self.reaches_run(strokes, index, self.branch.opposite())
+    }
+
+    /// Whether the rail reaches the end of stroke `index` and of all that is printed after it
+    /// without a break from one side.
+    fn reaches_run(&self, strokes: &[Stroke], index: usize, branch: Branch) -> bool {
+        if branch == Branch::Near {
+            return true;
+        }
+        let run = strokes[index + 1..].iter().take_while(|stroke| stroke.kind == Kind::Print);
+        std::iter::once(&strokes[index]).chain(run).all(|stroke| {
+            let at = Rotation2d(self.params.azimuth).turn(&stroke.to);
+            self.alignment.over_bed(&at.xy()).norm() <= self.far_reach
+        })
+    }
+}
+
+/// A turn about the z axis.
+struct Rotation2d(f64);
+
+impl Rotation2d {
+    fn turn(&self, p: &Point3<f64>) -> Point3<f64> {
+        let xy = Rotation2::new(self.0) * p.xy();
+        Point3::new(xy.x, xy.y, p.z)
+    }
+}
+
+fn way_lengths(way: &[Piece], from: Point2<f64>, clearance: f64) -> Vec<f64> {
+    let mut at = from;
+    way.iter()
+        .map(|piece| {
+            let length = match piece {
+                Piece::Line(to) => (to - at).norm(),
+                Piece::Arc(sweep, _) => sweep.abs() * clearance,
+            };
+            at = piece.end();
+            length
+        })
+        .collect()
+}
+
+fn between(a: &Joints, b: &Joints, share: f64) -> Joints {
+    let blend = |from: f64, to: f64| from + (to - from) * share;
+    Joints {
+        s: blend(a.s, b.s),
+        turn: BedTurn::accumulated(blend(a.turn.radians(), b.turn.radians())),
+        z: blend(a.z, b.z),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::printer;
+    use std::f64::consts::PI;
+
+    const PARAMS: ResampleParams =
+        ResampleParams { chord: 0.005, travel_chord: 0.1, straight_over_part: false, azimuth: 0.0 };
+
+    fn print(x: f64, y: f64) -> Stroke {
+        Stroke { kind: Kind::Print, to: Point3::new(x, y, 0.2), filament: 0.1, speed: 50.0 }
+    }
+
+    fn travel(x: f64, y: f64) -> Stroke {
+        Stroke { kind: Kind::Travel, filament: 0.0, ..print(x, y) }
+    }
+
+    fn legs(resampler: &mut Resampler, strokes: &[Stroke]) -> Vec<Leg> {
+        resampler.legs(strokes).unwrap().into_iter().flatten().collect()
+    }
+
+    /// Greatest distance of joint-linear legs from the line through `a` and `b`.
+    fn deviation(start: Joints, legs: &[Leg], a: [f64; 2], b: [f64; 2]) -> f64 {
+        let (a, b) = (Point2::from(a), Point2::from(b));
+        let mut from = start;
+        let mut worst: f64 = 0.0;
+        for leg in legs {
+            for k in 0..=50 {
+                let p = Alignment::default().part_from_joints(&between(
+                    &from,
+                    &leg.to,
+                    f64::from(k) / 50.0,
+                ));
+                worst = worst.max(geom::polyline::distance_to_segment(&a, &b, &p.xy()));
+            }
+            from = leg.to;
+        }
+        worst
+    }
+
+    #[test]
+    fn moves_stay_within_the_chord_tolerance() {
+        for offset in [0.5, 1.0, 3.0, 10.0, 30.0] {
+            let mut resampler = Resampler::new(&printer(), PARAMS);
+            legs(&mut resampler, &[travel(-40.0, offset)]);
+            let start = resampler.joints();
+            let line = legs(&mut resampler, &[print(40.0, offset)]);
+            let worst = deviation(start, &line, [-40.0, offset], [40.0, offset]);
+            assert!(worst <= 0.005 * 1.05, "{worst} at {offset}");
+            assert!(line.len() < 130, "{} moves at {offset}", line.len());
+            let fed: f64 = line.iter().map(|leg| leg.filament).sum();
+            assert!((fed - 0.1).abs() < 1e-12);
+            assert!(line.iter().all(|leg| leg.at.z == 0.2));
+        }
+    }
+
+    #[test]
+    fn a_line_that_grazes_the_axis_goes_round_it() {
+        let mut near_only = printer();
+        near_only.rail.min = 0.0;
+        near_only.axis_clearance = 0.1;
+        for offset in [0.0, 0.03, -0.07] {
+            let mut resampler = Resampler::new(&near_only, PARAMS);
+            legs(&mut resampler, &[travel(-10.0, offset)]);
+            let line = legs(&mut resampler, &[print(10.0, offset)]);
+            let nearest = line.iter().map(|leg| leg.to.s).fold(f64::INFINITY, f64::min);
+            assert!(nearest >= 0.1 - 1e-9, "{nearest}");
+            assert!(line.iter().all(|leg| leg.to.s >= 0.0));
+        }
+    }
+
+    #[test]
+    fn a_line_through_the_axis_turns_nothing_where_the_carriage_can_pass() {
+        let mut resampler = Resampler::new(&printer(), PARAMS);
+        legs(&mut resampler, &[travel(0.0, 15.0), travel(-10.0, 0.0)]);
+        let line = legs(&mut resampler, &[print(10.0, 0.0), print(10.0, 4.0)]);
+        assert_eq!(line[0].to.s, -10.0);
+        assert!((line[0].to.turn.radians().abs() - PI).abs() < 1e-9);
+        assert!(line.iter().all(|leg| leg.to.s < 0.0));
+        // Too long for the far side: round the axis on the near one.
+        let mut resampler = Resampler::new(&printer(), PARAMS);
+        legs(&mut resampler, &[travel(0.0, 15.0), travel(-40.0, 0.0)]);
+        let line = legs(&mut resampler, &[print(40.0, 0.0)]);
+        assert!(line.iter().all(|leg| leg.to.s > 0.0));
+    }
+
+    #[test]
+    fn the_far_side_is_left_when_the_next_run_is_out_of_its_reach() {
+        let mut resampler = Resampler::new(&printer(), PARAMS);
+        legs(&mut resampler, &[travel(0.0, 15.0)]);
+        let strokes = [travel(-10.0, 0.0), print(10.0, 0.0), travel(12.0, 1.0), print(60.0, 1.0)];
+        let all = resampler.legs(&strokes).unwrap();
+        assert!(all[1].iter().all(|leg| leg.to.s < 0.0));
+        assert!(all[3].iter().all(|leg| leg.to.s > 0.0));
+        for leg in all.iter().flatten() {
+            assert!(leg.to.s >= -25.0);
+        }
+    }
+
+    #[test]
+    fn ends_on_the_axis_are_kept_clear_of_it() {
+        let mut resampler = Resampler::new(&printer(), PARAMS);
+        let path = [travel(5.0, 5.0), print(0.0, 0.0), print(-4.0, 3.0)];
+        for leg in legs(&mut resampler, &path) {
+            assert!(leg.to.s.abs() >= printer().axis_clearance - 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_azimuth_turns_the_bed_and_nothing_else() {
+        let strokes = [travel(12.0, 3.0), print(-9.0, 7.0), print(-9.0, -20.0)];
+        let mut plain = Resampler::new(&printer(), PARAMS);
+        let mut turned = Resampler::new(&printer(), ResampleParams { azimuth: 0.8, ..PARAMS });
+        let (plain, turned) = (legs(&mut plain, &strokes), legs(&mut turned, &strokes));
+        // The first stroke comes from home, which does not turn with the part.
+        let first = plain.iter().position(|leg| leg.kind == Kind::Print).unwrap();
+        let offset = turned.len() - plain.len();
+        for (a, b) in plain[first..].iter().zip(&turned[first + offset..]) {
+            assert!((a.to.s - b.to.s).abs() < 1e-9);
+            let turn = b.to.turn.radians() - a.to.turn.radians() - 0.8;
+            assert!(turn.abs() < 1e-9, "{turn}");
+        }
+    }
+
+    #[test]
+    fn straight_dialects_get_one_leg_a_stroke() {
+        let params = ResampleParams { straight_over_part: true, ..PARAMS };
+        let mut resampler = Resampler::new(&printer(), params);
+        let all = resampler.legs(&[travel(-40.0, 1.0), print(40.0, 1.0)]).unwrap();
+        assert_eq!((all[0].len(), all[1].len()), (1, 1));
+        assert!((all[1][0].path - 80.0).abs() < 1e-9);
+    }
+}

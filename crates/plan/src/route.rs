@@ -1,0 +1,424 @@
+//! What happens between lines: travel, retraction, lift, wipe; and how much filament a line takes.
+//!
+//! A layer becomes a list of strokes, straight over the part, each with the filament it feeds and
+//! the speed that is wanted; the machine's own limits come later.
+
+use geom::region::Region;
+use machine::program::{self, Layer, Step};
+use nalgebra::{Point3, distance};
+use slicer::toolpath::{LayerPaths, Role, Station};
+
+use crate::order::OrderedLine;
+
+/// Speeds that are wanted, mm/s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Speeds {
+    /// Outer walls.
+    pub external_perimeter: f64,
+    /// Other walls.
+    pub perimeter: f64,
+    /// Sparse infill.
+    pub infill: f64,
+    /// Solid infill.
+    pub solid_infill: f64,
+    /// Solid infill seen from above.
+    pub top_solid_infill: f64,
+    /// Single beads.
+    pub gap_fill: f64,
+    /// Everything on the first layer.
+    pub first_layer: f64,
+    /// Without extruding.
+    pub travel: f64,
+}
+
+impl Speeds {
+    fn of(&self, role: Role, is_first_layer: bool) -> f64 {
+        let speed = match role {
+            Role::ExternalPerimeter => self.external_perimeter,
+            Role::Perimeter => self.perimeter,
+            Role::InternalInfill => self.infill,
+            Role::SolidInfill => self.solid_infill,
+            Role::TopSolidInfill => self.top_solid_infill,
+            Role::GapFill => self.gap_fill,
+            Role::SkirtBrim => self.first_layer,
+        };
+        if is_first_layer { speed.min(self.first_layer) } else { speed }
+    }
+}
+
+/// How filament is fed and drawn back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FilamentParams {
+    /// Cross-section of the filament, mm².
+    pub area: f64,
+    /// Filament fed for each that the volume asks for.
+    pub multiplier: f64,
+    /// Most volume that melts, mm³/s.
+    pub volume_per_second: f64,
+    /// Filament drawn back before a travel, mm; 0 for never.
+    pub retract_length: f64,
+    /// Speed of drawing back and feeding again, mm/s.
+    pub retract_speed: f64,
+    /// Travels shorter than this leave the filament alone, mm.
+    pub retract_before_travel: f64,
+    /// How far the nozzle is lifted while the filament is drawn back, mm.
+    pub retract_lift: f64,
+    /// How far the nozzle runs back along the line while the filament is drawn back, mm.
+    pub wipe: f64,
+}
+
+/// What a stroke does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Lays material.
+    Print,
+    /// Moves without laying material.
+    Travel,
+    /// Moves filament alone.
+    Filament,
+}
+
+/// A straight piece of the nozzle's way over the part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stroke {
+    /// What it does.
+    pub kind: Kind,
+    /// Where it ends, part frame, mm.
+    pub to: Point3<f64>,
+    /// Filament fed, mm; negative when drawn back.
+    pub filament: f64,
+    /// The speed that is wanted, mm/s: of the nozzle, or of the filament where it stands still.
+    pub speed: f64,
+}
+
+/// A stroke, or a step that goes to the program as it is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Item {
+    /// A piece of the nozzle's way.
+    Stroke(Stroke),
+    /// Anything else.
+    Step(Step),
+}
+
+/// Puts strokes together; remembers where the nozzle is and whether the filament is drawn back.
+#[derive(Debug, Clone)]
+pub struct Router {
+    at: Point3<f64>,
+    retracted: bool,
+    /// The line just laid, for wiping.
+    last_line: Vec<Point3<f64>>,
+    top: f64,
+    /// Speed of the lift, mm/s.
+    lift_speed: f64,
+    items: Vec<Item>,
+}
+
+/// A line's width may drift by this share before viewers are told.
+const WIDTH_DRIFT: f64 = 0.05;
+
+impl Router {
+    /// Returns a router whose nozzle stands at `at`, filament ready.
+    #[must_use]
+    pub fn new(at: Point3<f64>, lift_speed: f64) -> Self {
+        Self {
+            at,
+            retracted: false,
+            last_line: Vec::new(),
+            top: 0.0,
+            lift_speed,
+            items: Vec::new(),
+        }
+    }
+
+    /// Where the nozzle stands.
+    #[must_use]
+    pub fn at(&self) -> Point3<f64> {
+        self.at
+    }
+
+    /// Highest nozzle position of any line so far, mm.
+    #[must_use]
+    pub fn top(&self) -> f64 {
+        self.top
+    }
+
+    /// Returns the strokes of a layer whose lines are in order.
+    #[must_use]
+    pub fn layer(
+        &mut self,
+        layer: &LayerPaths,
+        lines: &[OrderedLine],
+        speeds: &Speeds,
+        filament: &FilamentParams,
+    ) -> Vec<Item> {
+        let highest = lines.iter().flat_map(|line| &line.stations).map(|station| station.at.z);
+        self.top = highest.fold(self.top, f64::max);
+        self.items.push(Item::Step(Step::Layer(Layer {
+            index: layer.index,
+            top: self.top,
+            height: layer.thickness,
+        })));
+        let mut last_island = None;
+        for line in lines {
+            let same_island = line.island.is_some() && line.island == last_island;
+            let inside = line.island.filter(|_| same_island).map(|i| &layer.islands[i].outline);
+            self.travel(line.stations[0].at, inside, speeds.travel, filament);
+            self.line(line, layer.index == 0, speeds, filament);
+            last_island = line.island;
+        }
+        std::mem::take(&mut self.items)
+    }
+
+    /// Returns the strokes that draw the filament back and lift the nozzle by `lift` mm.
+    #[must_use]
+    pub fn leave(&mut self, lift: f64, filament: &FilamentParams) -> Vec<Item> {
+        self.retract(filament);
+        self.stroke(Kind::Travel, self.at + nalgebra::Vector3::z() * lift, 0.0, self.lift_speed);
+        std::mem::take(&mut self.items)
+    }
+
+    fn stroke(&mut self, kind: Kind, to: Point3<f64>, filament: f64, speed: f64) {
+        self.items.push(Item::Stroke(Stroke { kind, to, filament, speed }));
+        self.at = to;
+    }
+
+    /// Goes to the begin of a line; `inside` is an outline that need not be crossed.
+    fn travel(
+        &mut self,
+        to: Point3<f64>,
+        inside: Option<&Region>,
+        speed: f64,
+        filament: &FilamentParams,
+    ) {
+        let (from_plane, to_plane) = (self.at.xy(), to.xy());
+        let length = distance(&from_plane, &to_plane);
+        let stays_inside =
+            || inside.is_some_and(|outline| outline.contains_segment(&from_plane, &to_plane));
+        if length >= filament.retract_before_travel && !stays_inside() {
+            self.retract(filament);
+        }
+        let lift = if self.retracted { filament.retract_lift } else { 0.0 };
+        self.go_over(to, self.at.z.max(to.z) + lift, speed);
+        if self.retracted {
+            self.stroke(Kind::Filament, to, filament.retract_length, filament.retract_speed);
+            self.retracted = false;
+        }
+    }
+
+    /// Rises to `height`, crosses, and comes down.
+    fn go_over(&mut self, to: Point3<f64>, height: f64, speed: f64) {
+        if self.at.xy() == to.xy() && self.at.z == to.z {
+            return;
+        }
+        if height > self.at.z {
+            self.stroke(
+                Kind::Travel,
+                Point3::new(self.at.x, self.at.y, height),
+                0.0,
+                self.lift_speed,
+            );
+        }
+        if self.at.xy() != to.xy() {
+            self.stroke(Kind::Travel, Point3::new(to.x, to.y, self.at.z), 0.0, speed);
+        }
+        if self.at.z != to.z {
+            self.stroke(Kind::Travel, to, 0.0, self.lift_speed);
+        }
+    }
+
+    fn retract(&mut self, filament: &FilamentParams) {
+        if self.retracted || filament.retract_length == 0.0 {
+            return;
+        }
+        let wiped = self.wipe(filament);
+        let rest = filament.retract_length - wiped;
+        self.stroke(Kind::Filament, self.at, -rest, filament.retract_speed);
+        self.retracted = true;
+    }
+
+    /// Runs back along the last line while drawing filament back; returns how much.
+    fn wipe(&mut self, filament: &FilamentParams) -> f64 {
+        let line = std::mem::take(&mut self.last_line);
+        if filament.wipe <= 0.0 || line.last() != Some(&self.at) {
+            return 0.0;
+        }
+        // As fast as the retraction lasts, and a tenth of it left for the standstill.
+        let per_mm = 0.9 * filament.retract_length / filament.wipe;
+        let speed = filament.retract_speed / per_mm;
+        let (mut left, mut drawn) = (filament.wipe, 0.0);
+        for back in line.iter().rev().skip(1) {
+            let step = back - self.at;
+            let length = step.norm().min(left);
+            if length <= 0.0 {
+                continue;
+            }
+            let to = self.at + step.normalize() * length;
+            self.stroke(Kind::Travel, to, -per_mm * length, speed);
+            drawn += per_mm * length;
+            left -= length;
+            if left <= 0.0 {
+                break;
+            }
+        }
+        drawn
+    }
+
+    fn line(
+        &mut self,
+        line: &OrderedLine,
+        is_first_layer: bool,
+        speeds: &Speeds,
+        filament: &FilamentParams,
+    ) {
+        let wanted = speeds.of(line.role, is_first_layer);
+        let mut told_width = f64::NAN;
+        for pair in line.stations.windows(2) {
+            let (width, area) = mean(&pair[0], &pair[1]);
+            let drift = (width - told_width).abs();
+            if drift.is_nan() || drift > WIDTH_DRIFT * told_width {
+                self.items.push(Item::Step(Step::Bead(program_role(line.role), width)));
+                told_width = width;
+            }
+            let length = (pair[1].at - pair[0].at).norm();
+            let fed = area * length / filament.area * filament.multiplier;
+            let melts = filament.volume_per_second / (area * filament.multiplier);
+            self.stroke(Kind::Print, pair[1].at, fed, wanted.min(melts));
+        }
+        self.last_line = line.stations.iter().map(|station| station.at).collect();
+    }
+}
+
+/// Mean width and cross-section between two stations.
+fn mean(a: &Station, b: &Station) -> (f64, f64) {
+    (f64::midpoint(a.bead.width, b.bead.width), f64::midpoint(a.bead.area(), b.bead.area()))
+}
+
+fn program_role(role: Role) -> program::Role {
+    match role {
+        Role::ExternalPerimeter => program::Role::ExternalPerimeter,
+        Role::Perimeter => program::Role::Perimeter,
+        Role::InternalInfill => program::Role::InternalInfill,
+        Role::SolidInfill => program::Role::SolidInfill,
+        Role::TopSolidInfill => program::Role::TopSolidInfill,
+        Role::GapFill => program::Role::GapFill,
+        Role::SkirtBrim => program::Role::SkirtBrim,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geom::region::Fill;
+    use nalgebra::Point2;
+    use slicer::bead::Bead;
+    use slicer::toolpath::IslandPaths;
+
+    const BEAD: Bead = Bead { width: 0.45, thickness: 0.2 };
+
+    const SPEEDS: Speeds = Speeds {
+        external_perimeter: 30.0,
+        perimeter: 45.0,
+        infill: 60.0,
+        solid_infill: 50.0,
+        top_solid_infill: 30.0,
+        gap_fill: 20.0,
+        first_layer: 20.0,
+        travel: 120.0,
+    };
+
+    const FILAMENT: FilamentParams = FilamentParams {
+        area: 2.405_281_875,
+        multiplier: 1.0,
+        volume_per_second: 11.0,
+        retract_length: 0.8,
+        retract_speed: 35.0,
+        retract_before_travel: 2.0,
+        retract_lift: 0.2,
+        wipe: 0.0,
+    };
+
+    fn line(points: &[[f64; 2]], z: f64) -> OrderedLine {
+        OrderedLine {
+            role: Role::Perimeter,
+            stations: points
+                .iter()
+                .map(|p| Station { at: Point3::new(p[0], p[1], z), bead: BEAD })
+                .collect(),
+            island: Some(0),
+        }
+    }
+
+    fn layer() -> LayerPaths {
+        let ring = [[-10.0, -10.0], [10.0, -10.0], [10.0, 10.0], [-10.0, 10.0]].map(Point2::from);
+        let outline = Region::from_rings([ring.as_slice()], Fill::NonZero);
+        let island = IslandPaths { outline, ..IslandPaths::default() };
+        LayerPaths { index: 3, islands: vec![island], thickness: 0.2, ..LayerPaths::default() }
+    }
+
+    fn strokes(items: &[Item]) -> Vec<Stroke> {
+        items
+            .iter()
+            .filter_map(|item| match item {
+                Item::Stroke(stroke) => Some(*stroke),
+                Item::Step(_) => None,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn filament_is_the_volume_of_the_bead() {
+        let mut router = Router::new(Point3::new(0.0, 0.0, 0.8), 10.0);
+        let items =
+            router.layer(&layer(), &[line(&[[0.0, 0.0], [7.0, 0.0]], 0.8)], &SPEEDS, &FILAMENT);
+        let printed = strokes(&items);
+        assert_eq!(printed.len(), 1);
+        assert!((printed[0].filament * FILAMENT.area - 7.0 * BEAD.area()).abs() < 1e-12);
+        assert_eq!(printed[0].speed, 45.0);
+    }
+
+    #[test]
+    fn filament_is_drawn_back_only_across_outlines_and_always_fed_again() {
+        let mut router = Router::new(Point3::new(-9.0, 0.0, 0.8), 10.0);
+        let lines = [
+            line(&[[-9.0, 0.0], [-5.0, 0.0]], 0.8),
+            line(&[[5.0, 0.0], [9.0, 0.0]], 0.8),
+            line(&[[5.0, 30.0], [9.0, 30.0]], 0.8),
+        ];
+        let strokes = strokes(&router.layer(&layer(), &lines, &SPEEDS, &FILAMENT));
+        let drawn: Vec<f64> = strokes
+            .iter()
+            .filter(|stroke| stroke.kind == Kind::Filament)
+            .map(|stroke| stroke.filament)
+            .collect();
+        assert_eq!(drawn, [-0.8, 0.8]);
+        let lifted = strokes.iter().map(|stroke| stroke.to.z).fold(0.0, f64::max);
+        assert!((lifted - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_wipe_draws_back_the_same_amount() {
+        let filament = FilamentParams { wipe: 3.0, ..FILAMENT };
+        let mut router = Router::new(Point3::new(0.0, 0.0, 0.8), 10.0);
+        let lines = [
+            line(&[[0.0, 0.0], [1.0, 0.0], [1.0, 5.0]], 0.8),
+            line(&[[50.0, 0.0], [51.0, 0.0]], 0.8),
+        ];
+        let strokes = strokes(&router.layer(&layer(), &lines, &SPEEDS, &filament));
+        let back: f64 = strokes.iter().filter(|s| s.filament < 0.0).map(|s| s.filament).sum();
+        assert!((back + 0.8).abs() < 1e-12, "{back}");
+        let wiped = strokes.iter().find(|s| s.kind == Kind::Travel && s.filament < 0.0).unwrap();
+        assert_eq!(wiped.to, Point3::new(1.0, 2.0, 0.8));
+    }
+
+    #[test]
+    fn wide_beads_are_slowed_to_what_melts() {
+        let wide = Bead { width: 2.0, thickness: 0.3 };
+        let mut fat = line(&[[0.0, 0.0], [7.0, 0.0]], 0.8);
+        for station in &mut fat.stations {
+            station.bead = wide;
+        }
+        let mut router = Router::new(Point3::new(0.0, 0.0, 0.8), 10.0);
+        let strokes = strokes(&router.layer(&layer(), &[fat], &SPEEDS, &FILAMENT));
+        assert!((strokes[0].speed * wide.area() - 11.0).abs() < 1e-9);
+    }
+}

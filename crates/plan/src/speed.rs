@@ -1,0 +1,311 @@
+//! How fast the axes can follow: the duration of every move.
+//!
+//! A move may be slower than wanted for two reasons. No axis may exceed its speed; and from one move
+//! to the next no axis may change its speed faster than it can be accelerated: the difference of the
+//! two mean speeds, over the time between the middles of the two moves, is at most the axis's
+//! acceleration. The second rule holds between all neighbouring moves, at corners and at starts as
+//! much as along curves, so a program in which every move simply runs at its `F` asks nothing
+//! impossible of the bed, whatever the firmware knows of it.
+//!
+//! Method: durations start at the speed limits and are lengthened, to and fro along the layer, until
+//! the rule holds everywhere; of two moves the one that is faster in the violated axis gives way.
+//! Durations only ever grow, and doubling both of a pair quarters what it violates, so this ends.
+
+use machine::profile::Printer;
+
+use crate::resample::Leg;
+
+/// What the speed of a program must respect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Rail and bed: greatest speed and acceleration, in mm and radians.
+    axes: [AxisLimit; 2],
+    lift_speed: f64,
+    least_duration: f64,
+    /// Whether rail and bed are driven by this program at all.
+    polar: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct AxisLimit {
+    speed: f64,
+    acceleration: f64,
+}
+
+/// Share of a limit that is used. The text of a program rounds positions to 1 µm and 0.0001°, which
+/// on a short move is a fraction of a percent of its speed.
+const USED_SHARE: f64 = 0.99;
+
+/// Times that durations are gone over before the rest is left as it is. Each pass brings a change of
+/// speed one move further; 200 moves at 15° are eight turns of the bed.
+const MOST_PASSES: usize = 200;
+
+/// Share by which the acceleration may be exceeded and still count as kept; below the margin of
+/// [`USED_SHARE`].
+const SLACK: f64 = 1e-3;
+
+/// The speed of rail and bed in a move, and how long it lasts: what the next move joins on to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    speeds: [f64; 2],
+    duration: f64,
+}
+
+impl Pace {
+    /// Standing still, for as long as one likes.
+    pub const REST: Self = Self { speeds: [0.0, 0.0], duration: 0.0 };
+}
+
+impl Limits {
+    /// Returns the limits of a printer; with `polar` false only lift and command rate count.
+    #[must_use]
+    pub fn of(printer: &Printer, polar: bool) -> Self {
+        let limit = |speed: f64, acceleration: f64| AxisLimit {
+            speed: speed * USED_SHARE,
+            acceleration: acceleration * USED_SHARE,
+        };
+        Self {
+            axes: [
+                limit(printer.rail.speed, printer.rail.acceleration),
+                limit(printer.bed.speed, printer.bed.acceleration),
+            ],
+            lift_speed: printer.lift.speed * USED_SHARE,
+            least_duration: 1.0 / printer.moves_per_second,
+            polar,
+        }
+    }
+}
+
+/// How rail, bed and lift move in each leg.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Travel {
+    /// Rail (mm) and bed (radians).
+    pub(crate) axes: [f64; 2],
+    /// mm.
+    pub(crate) lift: f64,
+}
+
+/// Returns what the axes do in each leg that begins where the one before ends.
+pub(crate) fn travels(legs: &[Leg], start: machine::program::Joints) -> Vec<Travel> {
+    let mut from = start;
+    legs.iter()
+        .map(|leg| {
+            let travel = Travel {
+                axes: [leg.to.s - from.s, leg.to.turn.radians() - from.turn.radians()],
+                lift: leg.to.z - from.z,
+            };
+            from = leg.to;
+            travel
+        })
+        .collect()
+}
+
+/// Returns the duration of every leg, s, and the pace of the last.
+#[must_use]
+pub(crate) fn durations(
+    legs: &[Leg],
+    travels: &[Travel],
+    before: Pace,
+    limits: &Limits,
+) -> (Vec<f64>, Pace) {
+    let mut durations: Vec<f64> =
+        legs.iter().zip(travels).map(|(leg, travel)| at_speed(leg, travel, limits)).collect();
+    if limits.polar {
+        keep_accelerations(&mut durations, travels, before, limits);
+    }
+    let last = match (travels.last(), durations.last()) {
+        (Some(travel), Some(&duration)) => {
+            Pace { speeds: travel.axes.map(|distance| distance / duration), duration }
+        }
+        _ => before,
+    };
+    (durations, last)
+}
+
+/// The least duration in which no axis exceeds its speed.
+fn at_speed(leg: &Leg, travel: &Travel, limits: &Limits) -> f64 {
+    let distance = if leg.path > 0.0 { leg.path } else { leg.filament.abs() };
+    let mut duration = (distance / leg.speed).max(travel.lift.abs() / limits.lift_speed);
+    if limits.polar {
+        for (distance, limit) in travel.axes.iter().zip(&limits.axes) {
+            duration = duration.max(distance.abs() / limit.speed);
+        }
+    }
+    duration.max(limits.least_duration)
+}
+
+fn keep_accelerations(durations: &mut [f64], travels: &[Travel], before: Pace, limits: &Limits) {
+    for _ in 0..MOST_PASSES {
+        let mut changed = join_on(before, durations, travels, limits);
+        for i in 1..durations.len() {
+            changed |= agree(i - 1, durations, travels, limits);
+        }
+        for i in (1..durations.len()).rev() {
+            changed |= agree(i - 1, durations, travels, limits);
+        }
+        if !changed {
+            return;
+        }
+    }
+}
+
+/// Makes the first move agree with what ran before it, which can no longer change.
+fn join_on(before: Pace, durations: &mut [f64], travels: &[Travel], limits: &Limits) -> bool {
+    let (Some(duration), Some(travel)) = (durations.first_mut(), travels.first()) else {
+        return false;
+    };
+    let mut changed = false;
+    for k in 0..2 {
+        let acceleration = limits.axes[k].acceleration;
+        let excess = |duration: f64| {
+            let between = f64::midpoint(before.duration, duration);
+            (travel.axes[k] / duration - before.speeds[k]).abs() / (between * acceleration)
+        };
+        if excess(*duration) <= 1.0 + SLACK {
+            continue;
+        }
+        *duration =
+            slowed(travel.axes[k], before.speeds[k], before.duration, acceleration).max(*duration);
+        // Where the earlier move turned the other way or faster, only time helps.
+        while excess(*duration) > 1.0 + SLACK {
+            *duration *= 1.1;
+        }
+        changed = true;
+    }
+    changed
+}
+
+/// Makes moves `i` and `i + 1` agree; returns whether anything changed.
+fn agree(i: usize, durations: &mut [f64], travels: &[Travel], limits: &Limits) -> bool {
+    let mut changed = false;
+    for k in 0..2 {
+        let acceleration = limits.axes[k].acceleration;
+        let distances = [travels[i].axes[k], travels[i + 1].axes[k]];
+        let speeds = [distances[0] / durations[i], distances[1] / durations[i + 1]];
+        let between = f64::midpoint(durations[i], durations[i + 1]);
+        let excess = (speeds[1] - speeds[0]).abs() / (between * acceleration);
+        if excess <= 1.0 + SLACK {
+            continue;
+        }
+        changed = true;
+        let faster = usize::from(speeds[1].abs() > speeds[0].abs());
+        let slower = 1 - faster;
+        let wanted = slowed(distances[faster], speeds[slower], durations[i + slower], acceleration);
+        if distances[faster].abs() / wanted >= speeds[slower].abs() {
+            durations[i + faster] = durations[i + faster].max(wanted);
+        } else {
+            // They run against each other: both give way alike.
+            let stretch = excess.sqrt();
+            durations[i] *= stretch;
+            durations[i + 1] *= stretch;
+        }
+    }
+    changed
+}
+
+/// The duration of a move of `distance` next to one at speed `other` for `other_duration`, in which
+/// the speeds differ by just what the acceleration allows: the positive root of
+/// `a/2·t² + (a/2·t₀ + v₀)·t − d = 0`, `v₀` positive where both run the same way.
+fn slowed(distance: f64, other: f64, other_duration: f64, acceleration: f64) -> f64 {
+    let along = other * distance.signum();
+    let b = acceleration * other_duration / 2.0 + along;
+    let root = (b * b + 2.0 * acceleration * distance.abs()).sqrt();
+    (root - b) / acceleration
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::resample::{ResampleParams, Resampler};
+    use crate::route::{Kind, Stroke};
+    use crate::testing::printer;
+    use nalgebra::Point3;
+
+    fn planned(points: &[[f64; 2]], speed: f64) -> (Vec<Leg>, Vec<Travel>, Vec<f64>) {
+        let printer = printer();
+        let params = ResampleParams {
+            chord: 0.005,
+            travel_chord: 0.1,
+            straight_over_part: false,
+            azimuth: 0.0,
+        };
+        let mut resampler = Resampler::new(&printer, params);
+        let start = resampler.joints();
+        let strokes: Vec<Stroke> = points
+            .iter()
+            .enumerate()
+            .map(|(i, p)| Stroke {
+                kind: if i == 0 { Kind::Travel } else { Kind::Print },
+                to: Point3::new(p[0], p[1], 5.0),
+                filament: 0.0,
+                speed,
+            })
+            .collect();
+        let legs: Vec<Leg> = resampler.legs(&strokes).unwrap().into_iter().flatten().collect();
+        let travels = travels(&legs, start);
+        let limits = Limits::of(&printer, true);
+        let (durations, _) = durations(&legs, &travels, Pace::REST, &limits);
+        (legs, travels, durations)
+    }
+
+    fn check(travels: &[Travel], durations: &[f64]) {
+        let printer = printer();
+        let limits = [
+            (printer.rail.speed, printer.rail.acceleration),
+            (printer.bed.speed, printer.bed.acceleration),
+        ];
+        for (k, (speed, acceleration)) in limits.into_iter().enumerate() {
+            let mut before = (0.0, 0.0);
+            for (travel, &duration) in travels.iter().zip(durations) {
+                let now = travel.axes[k] / duration;
+                assert!(now.abs() <= speed, "axis {k}: {now} > {speed}");
+                let change = (now - before.0).abs() / f64::midpoint(before.1, duration);
+                assert!(change <= acceleration, "axis {k}: {change} > {acceleration}");
+                before = (now, duration);
+            }
+        }
+    }
+
+    #[test]
+    fn speed_and_acceleration_hold_everywhere() {
+        let star: Vec<[f64; 2]> = (0..60)
+            .map(|i| {
+                let angle = f64::from(i) * 2.2;
+                let radius = 0.3 + f64::from(i % 7) * 3.0;
+                [radius * angle.cos(), radius * angle.sin()]
+            })
+            .collect();
+        let zigzag: Vec<[f64; 2]> = (0..80)
+            .map(|i| [f64::from(i / 2) * 0.4 - 8.0, f64::from((i + 1) / 2 % 2) * 9.0 - 4.0])
+            .collect();
+        for points in [star, zigzag, vec![[-40.0, 0.1], [40.0, 0.1]], vec![[-9.0, 0.0], [9.0, 0.0]]]
+        {
+            let (_, travels, durations) = planned(&points, 100.0);
+            check(&travels, &durations);
+        }
+    }
+
+    #[test]
+    fn far_from_the_axis_nothing_is_slowed() {
+        let (legs, _, durations) = planned(&[[80.0, -20.0], [80.0, 20.0]], 40.0);
+        let line: Vec<usize> = (0..legs.len()).filter(|&i| legs[i].kind == Kind::Print).collect();
+        // But for the first and last moves, which start and stop.
+        for &i in &line[3..line.len() - 3] {
+            assert!((legs[i].path / durations[i] - 40.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_line_past_the_axis_is_slow_only_there() {
+        let (legs, _, durations) = planned(&[[-40.0, 0.5], [40.0, 0.5]], 60.0);
+        let total: f64 = legs
+            .iter()
+            .zip(&durations)
+            .filter(|(leg, _)| leg.kind == Kind::Print)
+            .map(|(_, duration)| duration)
+            .sum();
+        // 80 mm at 60 mm/s are 1.33 s, the half turn takes half a second; at one speed all along
+        // it would be 25 s.
+        assert!((1.6..2.2).contains(&total), "{total}");
+    }
+}

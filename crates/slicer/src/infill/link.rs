@@ -1,0 +1,226 @@
+//! Lines joined along the rim of their area, into as few as possible.
+//!
+//! Neighbouring line ends on a ring can be joined by the piece of rim between them, on which no
+//! other line ends. A line is grown from its free end, always over the shorter of the two joins
+//! there that lead to a line not used yet; for parallel lines this yields the familiar zigzag, for
+//! pieces of a spiral its counterpart, with no special case for either. What is left over is
+//! joined shortest first, except where that would close a loop.
+
+use geom::grid::mm;
+use geom::region::Region;
+use nalgebra::{Point2, distance};
+
+use super::{Chord, RimPoint};
+
+/// One end of a chord: the chord's index and 0 for its begin, 1 for its end.
+type End = (usize, usize);
+
+/// A piece of rim between two ends, in the direction of the ring.
+#[derive(Clone, Copy)]
+struct Join {
+    length: f64,
+    from: End,
+    to: End,
+}
+
+impl Join {
+    /// The end that is not `end`.
+    fn other(&self, end: End) -> End {
+        if self.from == end { self.to } else { self.from }
+    }
+}
+
+/// The joins that were made, by the ends that they join.
+struct Made {
+    by_end: Vec<[Option<Join>; 2]>,
+    groups: Groups,
+}
+
+impl Made {
+    fn is_free(&self, end: End) -> bool {
+        self.by_end[end.0][end.1].is_none()
+    }
+
+    /// Makes a join, unless an end is taken or a loop would close.
+    fn make(&mut self, join: &Join) -> bool {
+        let (a, b) = (join.from, join.to);
+        let possible = self.is_free(a) && self.is_free(b) && self.groups.merge(a.0, b.0);
+        if possible {
+            self.by_end[a.0][a.1] = Some(*join);
+            self.by_end[b.0][b.1] = Some(*join);
+        }
+        possible
+    }
+}
+
+/// Returns the chords joined along the rim of `core` by pieces of at most `longest` mm.
+pub(super) fn joined(core: &Region, chords: &[Chord], longest: f64) -> Vec<Vec<Point2<f64>>> {
+    let rings: Vec<Vec<Point2<f64>>> =
+        core.rings().map(|ring| ring.iter().map(|&p| mm(p)).collect()).collect();
+    let mut joins = possible_joins(&rings, chords);
+    joins.retain(|join| join.length <= longest);
+    let mut at_end: Vec<[Vec<usize>; 2]> = vec![[Vec::new(), Vec::new()]; chords.len()];
+    for (index, join) in joins.iter().enumerate() {
+        for end in [join.from, join.to] {
+            at_end[end.0][end.1].push(index);
+        }
+    }
+    let mut made =
+        Made { by_end: vec![[None; 2]; chords.len()], groups: Groups::new(chords.len()) };
+    let mut used = vec![false; chords.len()];
+    for start in 0..chords.len() {
+        if used[start] {
+            continue;
+        }
+        used[start] = true;
+        for side in [1, 0] {
+            grow((start, side), &joins, &at_end, &mut used, &mut made);
+        }
+    }
+    // Ties go by the order of the chords, which comes from the geometry alone.
+    joins.sort_unstable_by(|a, b| {
+        a.length.total_cmp(&b.length).then((a.from, a.to).cmp(&(b.from, b.to)))
+    });
+    for join in &joins {
+        made.make(join);
+    }
+    chains(&rings, chords, &made.by_end)
+}
+
+/// Grows a line from its free end over chords that are not used yet.
+fn grow(
+    mut end: End,
+    joins: &[Join],
+    at_end: &[[Vec<usize>; 2]],
+    used: &mut [bool],
+    made: &mut Made,
+) {
+    loop {
+        let shortest = at_end[end.0][end.1]
+            .iter()
+            .map(|&index| &joins[index])
+            .filter(|join| !used[join.other(end).0])
+            .min_by(|a, b| a.length.total_cmp(&b.length));
+        let Some(join) = shortest else { return };
+        let next = join.other(end);
+        if !made.make(join) {
+            return;
+        }
+        used[next.0] = true;
+        end = (next.0, 1 - next.1);
+    }
+}
+
+/// All pieces of rim between neighbouring ends.
+fn possible_joins(rings: &[Vec<Point2<f64>>], chords: &[Chord]) -> Vec<Join> {
+    let mut on_ring: Vec<Vec<(RimPoint, End)>> = vec![Vec::new(); rings.len()];
+    for (index, chord) in chords.iter().enumerate() {
+        for (k, rim) in chord.ends.iter().enumerate() {
+            if let Some(rim) = rim {
+                on_ring[rim.ring].push((*rim, (index, k)));
+            }
+        }
+    }
+    let mut joins = Vec::new();
+    for (ring, mut ends) in rings.iter().zip(on_ring) {
+        if ends.len() < 2 {
+            continue;
+        }
+        ends.sort_unstable_by(|(a, a_end), (b, b_end)| {
+            a.side.cmp(&b.side).then(a.share.total_cmp(&b.share)).then(a_end.cmp(b_end))
+        });
+        let mut start_of_side = vec![0.0];
+        for side in 0..ring.len() {
+            let length = distance(&ring[side], &ring[(side + 1) % ring.len()]);
+            start_of_side.push(start_of_side[side] + length);
+        }
+        let position = |rim: &RimPoint| {
+            let (start, end) = (start_of_side[rim.side], start_of_side[rim.side + 1]);
+            start + (end - start) * rim.share
+        };
+        let around = start_of_side[ring.len()];
+        for k in 0..ends.len() {
+            let (rim, from) = &ends[k];
+            let (next_rim, to) = &ends[(k + 1) % ends.len()];
+            let ahead = position(next_rim) - position(rim);
+            let length = if k + 1 == ends.len() { ahead + around } else { ahead };
+            joins.push(Join { length, from: *from, to: *to });
+        }
+    }
+    joins
+}
+
+/// Walks through chords and joins from every free end.
+fn chains(
+    rings: &[Vec<Point2<f64>>],
+    chords: &[Chord],
+    made: &[[Option<Join>; 2]],
+) -> Vec<Vec<Point2<f64>>> {
+    let mut used = vec![false; chords.len()];
+    let mut lines = Vec::new();
+    for start in 0..chords.len() {
+        let free = (0..2).find(|&k| made[start][k].is_none());
+        let Some(mut entry) = free.filter(|_| !used[start]) else { continue };
+        let mut at = start;
+        let mut line: Vec<Point2<f64>> = Vec::new();
+        loop {
+            used[at] = true;
+            if entry == 0 {
+                line.extend(&chords[at].points);
+            } else {
+                line.extend(chords[at].points.iter().rev());
+            }
+            let exit = 1 - entry;
+            let Some(join) = made[at][exit] else { break };
+            let forwards = join.from == (at, exit);
+            append_rim(rings, chords, &join, forwards, &mut line);
+            (at, entry) = join.other((at, exit));
+        }
+        lines.push(line);
+    }
+    lines
+}
+
+/// Appends the corners of the ring between the two ends of a join.
+fn append_rim(
+    rings: &[Vec<Point2<f64>>],
+    chords: &[Chord],
+    join: &Join,
+    forwards: bool,
+    line: &mut Vec<Point2<f64>>,
+) {
+    let rim = |end: End| chords[end.0].ends[end.1].expect("joins end on the rim");
+    let (from, to) = (rim(join.from), rim(join.to));
+    let ring = &rings[from.ring];
+    let wraps = (to.side, to.share) < (from.side, from.share) || join.from == join.to;
+    let sides = to.side + if wraps { ring.len() } else { 0 } - from.side;
+    let start = line.len();
+    line.extend((1..=sides).map(|k| ring[(from.side + k) % ring.len()]));
+    if !forwards {
+        line[start..].reverse();
+    }
+}
+
+/// Which chords hang together already (union–find).
+struct Groups(Vec<usize>);
+
+impl Groups {
+    fn new(count: usize) -> Self {
+        Self((0..count).collect())
+    }
+
+    fn root(&mut self, mut item: usize) -> usize {
+        while self.0[item] != item {
+            self.0[item] = self.0[self.0[item]];
+            item = self.0[item];
+        }
+        item
+    }
+
+    /// Joins two groups; false when they were one already.
+    fn merge(&mut self, a: usize, b: usize) -> bool {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b)] = a.min(b);
+        a != b
+    }
+}

@@ -1,0 +1,366 @@
+//! Lines that fill an area.
+//!
+//! Every pattern answers the same question: which lines, inside an area, lie a given distance
+//! apart? Open lines come as [`Chord`]s that end on the rim of the area and are then joined along
+//! it ([`link`]); closed ones are loops.
+//!
+//! Lines keep half a spacing from the edge of the area. With the pieces of rim that join them they
+//! then take exactly the area's volume: a line that ends at the rim leaves half a spacing at either
+//! end, and each join along the rim makes up for two of those halves.
+
+mod concentric;
+mod link;
+mod rectilinear;
+mod spiral;
+
+use geom::region::{Island, Region};
+use geom::simplify::simplify_line;
+use geom::spiral::Turning;
+use nalgebra::Point2;
+
+use crate::bead::Bead;
+use crate::skins::Skins;
+use crate::toolpath::Role;
+
+/// How the lines of an area run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pattern {
+    /// Parallel lines, turned by 90° from layer to layer.
+    Rectilinear,
+    /// Two sets of parallel lines in every layer, each half as dense.
+    Grid,
+    /// Loops that follow the outline inwards.
+    Concentric,
+    /// The Archimedean spiral about the rotation axis.
+    Archimedean,
+}
+
+/// How areas are filled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InfillParams {
+    /// Share of a sparse area that is filled, above 0 and at most 1; 0 leaves it empty.
+    pub density: f64,
+    /// Pattern of sparse areas.
+    pub pattern: Pattern,
+    /// Pattern of solid areas.
+    pub solid_pattern: Pattern,
+    /// Direction of parallel lines, radians from the part's reference azimuth.
+    pub angle: f64,
+    /// Width of sparse lines, mm.
+    pub width: f64,
+    /// Width of solid lines, mm.
+    pub solid_width: f64,
+    /// Width of solid lines that are seen from above, mm.
+    pub top_width: f64,
+}
+
+/// A line of infill in the chart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FillLine {
+    /// What it is for.
+    pub role: Role,
+    /// The bead, the same all along.
+    pub bead: Bead,
+    /// Whether it ends where it begins; the first point is not repeated.
+    pub closed: bool,
+    /// Points, mm.
+    pub points: Vec<Point2<f64>>,
+}
+
+/// A place on the rim of an area: a share of the way along one side of one of its rings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RimPoint {
+    /// Index of the ring among all rings of the area.
+    pub(crate) ring: usize,
+    /// Index of the side; side `i` begins at point `i`.
+    pub(crate) side: usize,
+    /// Share of the side before the place.
+    pub(crate) share: f64,
+}
+
+/// A line across an area, from rim to rim.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Chord {
+    /// Points, mm.
+    pub(crate) points: Vec<Point2<f64>>,
+    /// Where on the rim it begins and ends; `None` for an end inside the area.
+    pub(crate) ends: [Option<RimPoint>; 2],
+}
+
+/// The layer that is filled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FillLayer {
+    /// Counted from 0; patterns alternate with it.
+    pub index: usize,
+    /// Thickness of the beads, mm.
+    pub thickness: f64,
+    /// How far lines may lie from their ideal course, mm.
+    pub tolerance: f64,
+}
+
+/// Lines shorter than this many widths are blobs and are left out.
+const LEAST_LENGTH_IN_WIDTHS: f64 = 0.5;
+
+/// Joins along the rim of a sparse area are material that no one asked for: up to this length
+/// they cost less than the travel and the retraction that they save, mm.
+const LONGEST_SPARSE_JOIN_MM: f64 = 10.0;
+
+/// What fills the solid and sparse areas of an island.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Filling {
+    /// The lines.
+    pub lines: Vec<FillLine>,
+    /// Places between lines that want a single bead of their own width.
+    pub thin: Vec<Region>,
+}
+
+/// Fills the solid and sparse areas of an island.
+#[must_use]
+pub fn fill(skins: &Skins, layer: &FillLayer, params: &InfillParams) -> Filling {
+    let mut filling = Filling::default();
+    for (region, role, width) in [
+        (&skins.solid, Role::SolidInfill, params.solid_width),
+        (&skins.top, Role::TopSolidInfill, params.top_width),
+    ] {
+        for island in region.islands() {
+            solid(island, role, width, layer, params, &mut filling);
+        }
+    }
+    if params.density > 0.0 && !skins.sparse.is_empty() {
+        filling.lines.extend(sparse(&skins.sparse, layer, params));
+    }
+    filling
+}
+
+/// The direction of parallel lines in a layer.
+fn angle_in(layer: &FillLayer, params: &InfillParams) -> f64 {
+    params.angle + if layer.index.is_multiple_of(2) { 0.0 } else { std::f64::consts::FRAC_PI_2 }
+}
+
+fn solid(
+    island: &Island,
+    role: Role,
+    width: f64,
+    layer: &FillLayer,
+    params: &InfillParams,
+    filling: &mut Filling,
+) {
+    let bead = Bead { width, thickness: layer.thickness };
+    let area = Region::from_island(island.clone());
+    match params.solid_pattern {
+        Pattern::Rectilinear | Pattern::Grid => {
+            let angle = angle_in(layer, params);
+            // The lines are spread so that a whole number of them fills the island.
+            let even = rectilinear::even_spacing(&area, bead.spacing(), angle);
+            let bead = Bead::with_spacing(even, layer.thickness);
+            let core = area.inset(even / 2.0);
+            let chords: Vec<Chord> = core
+                .islands()
+                .iter()
+                .flat_map(|island| rectilinear::evenly_spread(&core, island, even, angle))
+                .collect();
+            filling.lines.extend(open_lines(&core, &chords, f64::INFINITY, role, bead, layer));
+        }
+        Pattern::Concentric => {
+            let (loops, thin) = concentric::solid(&area, bead.spacing());
+            filling.lines.extend(closed_lines(loops, role, bead));
+            filling.thin.extend(thin);
+        }
+        Pattern::Archimedean => {
+            let core = area.inset(bead.spacing() / 2.0);
+            // Turns of neighbouring layers lie in each other's grooves.
+            let phase = if layer.index.is_multiple_of(2) { 0.0 } else { std::f64::consts::PI };
+            let turning = turning(layer.index);
+            let chords = spiral::chords(&core, bead.spacing(), phase, turning, layer.tolerance);
+            filling.lines.extend(open_lines(&core, &chords, f64::INFINITY, role, bead, layer));
+        }
+    }
+}
+
+fn turning(index: usize) -> Turning {
+    if index.is_multiple_of(2) { Turning::CounterClockwise } else { Turning::Clockwise }
+}
+
+fn sparse(area: &Region, layer: &FillLayer, params: &InfillParams) -> Vec<FillLine> {
+    let role = Role::InternalInfill;
+    let bead = Bead { width: params.width, thickness: layer.thickness };
+    let spacing = bead.spacing() / params.density;
+    let core = area.inset(bead.spacing() / 2.0);
+    let join = LONGEST_SPARSE_JOIN_MM;
+    let parallel = |spacing: f64, angle: f64| {
+        let chords = rectilinear::about_axis(&core, spacing, angle);
+        open_lines(&core, &chords, join, role, bead, layer)
+    };
+    match params.pattern {
+        Pattern::Rectilinear => parallel(spacing, angle_in(layer, params)),
+        Pattern::Grid => {
+            let mut lines = parallel(2.0 * spacing, params.angle);
+            lines.extend(parallel(2.0 * spacing, params.angle + std::f64::consts::FRAC_PI_2));
+            lines
+        }
+        Pattern::Concentric => {
+            let loops = concentric::sparse(area, bead.spacing() / 2.0, spacing);
+            closed_lines(loops, role, bead).collect()
+        }
+        Pattern::Archimedean => {
+            // Sparse lines must stand on those of the layer below: neither phase nor sense changes.
+            let turning = Turning::CounterClockwise;
+            let chords = spiral::chords(&core, spacing, 0.0, turning, layer.tolerance);
+            open_lines(&core, &chords, join, role, bead, layer)
+        }
+    }
+}
+
+fn open_lines(
+    core: &Region,
+    chords: &[Chord],
+    longest_join: f64,
+    role: Role,
+    bead: Bead,
+    layer: &FillLayer,
+) -> Vec<FillLine> {
+    link::joined(core, chords, longest_join)
+        .into_iter()
+        .map(|points| simplify_line(&points, layer.tolerance))
+        .filter(|points| geom::polyline::length(points) >= LEAST_LENGTH_IN_WIDTHS * bead.width)
+        .map(|points| FillLine { role, bead, closed: false, points })
+        .collect()
+}
+
+fn closed_lines(
+    loops: Vec<Vec<Point2<f64>>>,
+    role: Role,
+    bead: Bead,
+) -> impl Iterator<Item = FillLine> {
+    loops.into_iter().map(move |points| FillLine { role, bead, closed: true, points })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geom::region::Fill;
+    use std::f64::consts::{FRAC_PI_4, TAU};
+
+    const LAYER: FillLayer = FillLayer { index: 0, thickness: 0.2, tolerance: 0.002 };
+
+    const PARAMS: InfillParams = InfillParams {
+        density: 0.2,
+        pattern: Pattern::Rectilinear,
+        solid_pattern: Pattern::Rectilinear,
+        angle: FRAC_PI_4,
+        width: 0.45,
+        solid_width: 0.45,
+        top_width: 0.45,
+    };
+
+    const PATTERNS: [Pattern; 4] =
+        [Pattern::Rectilinear, Pattern::Grid, Pattern::Concentric, Pattern::Archimedean];
+
+    fn polygon(points: &[[f64; 2]]) -> Region {
+        let ring: Vec<Point2<f64>> = points.iter().map(|&p| Point2::from(p)).collect();
+        Region::from_rings([ring.as_slice()], Fill::NonZero)
+    }
+
+    fn rectangle(x: f64, y: f64, width: f64, height: f64) -> Region {
+        polygon(&[[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
+    }
+
+    fn disc(radius: f64) -> Region {
+        let ring: Vec<[f64; 2]> = (0..200)
+            .map(|i| {
+                let angle = f64::from(i) * TAU / 200.0;
+                [radius * angle.cos() + 3.0, radius * angle.sin()]
+            })
+            .collect();
+        polygon(&ring)
+    }
+
+    fn areas() -> Vec<Region> {
+        let frame = rectangle(-12.0, -9.0, 24.0, 18.0).difference(&disc(5.0));
+        vec![rectangle(-8.0, -8.0, 16.0, 16.0), disc(9.0), frame, rectangle(2.0, 1.0, 22.0, 1.3)]
+    }
+
+    /// Area that lines take, and what is left to single beads.
+    fn laid(filling: &Filling) -> f64 {
+        let thin: f64 = filling.thin.iter().map(|place| place.opened(0.1).area()).sum();
+        let lines: f64 = filling
+            .lines
+            .iter()
+            .map(|line| {
+                let closing = if line.closed {
+                    (line.points[0] - line.points[line.points.len() - 1]).norm()
+                } else {
+                    0.0
+                };
+                (geom::polyline::length(&line.points) + closing) * line.bead.spacing()
+            })
+            .sum();
+        lines + thin
+    }
+
+    #[test]
+    fn solid_lines_take_the_area() {
+        for pattern in PATTERNS {
+            for (k, area) in areas().iter().enumerate() {
+                let skins = Skins { solid: area.clone(), ..Skins::default() };
+                for index in 0..2 {
+                    let layer = FillLayer { index, ..LAYER };
+                    let params = InfillParams { solid_pattern: pattern, ..PARAMS };
+                    let ratio = laid(&fill(&skins, &layer, &params)) / area.area();
+                    // Turns of a spiral end where the area does, whatever the pitch; in a narrow
+                    // strip that is a good part of it.
+                    let slack = match pattern {
+                        Pattern::Rectilinear | Pattern::Grid => 0.008,
+                        Pattern::Concentric => 0.02,
+                        Pattern::Archimedean if k == 3 => 0.1,
+                        Pattern::Archimedean => 0.03,
+                    };
+                    assert!((ratio - 1.0).abs() < slack, "{pattern:?}, area {k}: {ratio}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn parallel_lines_fill_at_every_angle() {
+        for k in 0..36 {
+            let params = InfillParams { angle: f64::from(k) * TAU / 72.0, ..PARAMS };
+            for (index, area) in areas().iter().enumerate() {
+                let skins = Skins { solid: area.clone(), ..Skins::default() };
+                let ratio = laid(&fill(&skins, &LAYER, &params)) / area.area();
+                assert!((ratio - 1.0).abs() < 0.02, "angle {k}, area {index}: {ratio}");
+            }
+        }
+    }
+
+    #[test]
+    fn sparse_lines_have_the_density() {
+        for pattern in PATTERNS {
+            let area = rectangle(-30.0, -30.0, 60.0, 60.0);
+            let skins = Skins { sparse: area.clone(), ..Skins::default() };
+            let params = InfillParams { pattern, ..PARAMS };
+            let share = laid(&fill(&skins, &LAYER, &params)) / area.area();
+            // Joins along the rim come on top.
+            assert!((0.19..0.23).contains(&share), "{pattern:?}: {share}");
+        }
+    }
+
+    #[test]
+    fn lines_stay_inside_and_are_few() {
+        for pattern in PATTERNS {
+            for area in areas() {
+                let skins = Skins { sparse: area.clone(), ..Skins::default() };
+                let params = InfillParams { pattern, ..PARAMS };
+                let lines = fill(&skins, &LAYER, &params).lines;
+                let grown = area.outset(0.01);
+                for line in &lines {
+                    for p in &line.points {
+                        assert!(grown.contains(p), "{pattern:?}: {p} is outside");
+                    }
+                }
+                let limit = if pattern == Pattern::Concentric { 40 } else { 12 };
+                assert!(lines.len() <= limit, "{pattern:?}: {} lines", lines.len());
+            }
+        }
+    }
+}

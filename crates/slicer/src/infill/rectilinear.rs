@@ -1,0 +1,130 @@
+//! Parallel lines.
+
+use geom::grid::mm;
+use geom::region::{Island, Region};
+use nalgebra::{Point2, Rotation2};
+
+use super::{Chord, RimPoint};
+
+/// How far the outermost of evenly spread lines keep from the rim, mm: exactly on it, whether they
+/// are found would be a matter of rounding.
+const OFF_RIM_MM: f64 = 1e-3;
+
+/// Returns lines `spacing` apart whose pattern is fixed to the axis: the axis lies midway between
+/// two of them, so that no line grazes it and lines of all layers stand on each other.
+pub(super) fn about_axis(core: &Region, spacing: f64, angle: f64) -> Vec<Chord> {
+    let rows = Rows { first: spacing / 2.0, spacing, count: None };
+    let rings: Vec<usize> = (0..core.rings().count()).collect();
+    chords(core, &rings, &rows, angle)
+}
+
+/// Returns the spacing near `wanted` of which a whole number fills `area` across the lines.
+pub(super) fn even_spacing(area: &Region, wanted: f64, angle: f64) -> f64 {
+    let (low, high) = extent(area.rings(), angle);
+    let across = high - low;
+    if across <= 0.0 { wanted } else { across / (across / wanted).round().max(1.0) }
+}
+
+/// Returns lines in one island of `core`, the first and last of them along its far sides.
+pub(super) fn evenly_spread(
+    core: &Region,
+    island: &Island,
+    spacing: f64,
+    angle: f64,
+) -> Vec<Chord> {
+    let (low, high) = extent(island.iter(), angle);
+    let (low, high) = (low + OFF_RIM_MM, high - OFF_RIM_MM);
+    if high <= low {
+        return Vec::new();
+    }
+    let gaps = ((high - low) / spacing).round();
+    let rows = if gaps < 1.0 {
+        Rows { first: f64::midpoint(low, high), spacing, count: Some(1) }
+    } else {
+        Rows { first: low, spacing: (high - low) / gaps, count: Some(gaps as i64 + 1) }
+    };
+    let own: Vec<usize> = core
+        .islands()
+        .iter()
+        .scan(0, |next, other| {
+            let rings = *next..*next + other.len();
+            *next = rings.end;
+            Some((rings, std::ptr::eq(other, island)))
+        })
+        .filter(|(_, is_own)| *is_own)
+        .flat_map(|(rings, _)| rings)
+        .collect();
+    chords(core, &own, &rows, angle)
+}
+
+/// The least and greatest coordinate across the lines.
+fn extent<'a>(rings: impl Iterator<Item = &'a geom::region::Ring>, angle: f64) -> (f64, f64) {
+    let (sin, cos) = angle.sin_cos();
+    rings.flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &p| {
+        let p = mm(p);
+        let v = -sin * p.x + cos * p.y;
+        (low.min(v), high.max(v))
+    })
+}
+
+/// Lines across: row `k` runs at `first + k·spacing`.
+struct Rows {
+    first: f64,
+    spacing: f64,
+    /// `None` for rows without end on both sides.
+    count: Option<i64>,
+}
+
+impl Rows {
+    /// The rows `v` with `low <= v < high`. Half-open, so that a ring is crossed an even number of
+    /// times by every row.
+    fn between(&self, low: f64, high: f64) -> std::ops::Range<i64> {
+        let row = |v: f64| ((v - self.first) / self.spacing).ceil() as i64;
+        let (from, to) = (row(low), row(high));
+        match self.count {
+            Some(count) => from.max(0)..to.min(count),
+            None => from..to,
+        }
+    }
+}
+
+struct Crossing {
+    row: i64,
+    along: f64,
+    rim: RimPoint,
+}
+
+fn chords(core: &Region, ring_indices: &[usize], rows: &Rows, angle: f64) -> Vec<Chord> {
+    let to_rows = Rotation2::new(-angle);
+    let rings: Vec<&geom::region::Ring> = core.rings().collect();
+    let mut crossings = Vec::new();
+    for &ring in ring_indices {
+        let points: Vec<Point2<f64>> = rings[ring].iter().map(|&p| to_rows * mm(p)).collect();
+        for side in 0..points.len() {
+            let (a, b) = (points[side], points[(side + 1) % points.len()]);
+            for row in rows.between(a.y.min(b.y), a.y.max(b.y)) {
+                let v = rows.first + row as f64 * rows.spacing;
+                let share = ((v - a.y) / (b.y - a.y)).clamp(0.0, 1.0);
+                let along = a.x + (b.x - a.x) * share;
+                crossings.push(Crossing { row, along, rim: RimPoint { ring, side, share } });
+            }
+        }
+    }
+    crossings.sort_unstable_by(|a, b| {
+        (a.row.cmp(&b.row))
+            .then(a.along.total_cmp(&b.along))
+            .then((a.rim.ring, a.rim.side).cmp(&(b.rim.ring, b.rim.side)))
+    });
+    let back = to_rows.inverse();
+    crossings
+        .chunks_exact(2)
+        .filter(|pair| pair[0].row == pair[1].row)
+        .map(|pair| {
+            let v = rows.first + pair[0].row as f64 * rows.spacing;
+            Chord {
+                points: [&pair[0], &pair[1]].map(|c| back * Point2::new(c.along, v)).to_vec(),
+                ends: [Some(pair[0].rim), Some(pair[1].rim)],
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,357 @@
+//! Single beads in places too thin for two.
+//!
+//! A bead runs along the middle of the place and is as wide as the place is there. The middle is
+//! the chordal axis: the place is filled with a constrained Delaunay triangulation of its densified
+//! rings, and the midpoints of the triangle sides that cross from rim to rim are joined.
+//!
+//! Source: L. Prasad (1997), "Morphological analysis of shapes", CNLS Newsletter 139. Differences:
+//! the width at a point of the axis is twice its true distance from the rim and not the length of
+//! the side, which overstates it between staggered points; branches shorter than the place is wide
+//! are corners and are dropped.
+
+use geom::grid::mm;
+use geom::polyline::{distance_to_segment, share_nearest};
+use geom::region::{Island, Region, ring_sides};
+use geom::simplify::mark_kept;
+use geom::triangulate::{Triangulation, triangulate};
+use nalgebra::{Point2, center, distance};
+
+use crate::toolpath::LostArea;
+
+/// The widths that a single bead may have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ThinParams {
+    /// Places thinner than this stay empty, mm.
+    pub least_width: f64,
+    /// The widest bead that is laid, mm.
+    pub greatest_width: f64,
+}
+
+/// A point of the axis and the width of the place there, mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct AxisPoint {
+    pub(crate) at: Point2<f64>,
+    pub(crate) width: f64,
+}
+
+/// Distance of points on the densified rings, mm: about half of the thinnest bead, so that sides of
+/// the triangulation cross from rim to rim and not along it.
+const RIM_STEP_MM: f64 = 0.15;
+
+/// How much an axis may be simplified, mm, in place and in half its width alike.
+const AXIS_TOLERANCE_MM: f64 = 0.01;
+
+/// Beads shorter than this many widths are blobs.
+const LEAST_LENGTH_IN_WIDTHS: f64 = 1.0;
+
+/// Returns the axes of the thin places of `region` and counts what no bead fits in.
+pub(crate) fn axes(
+    region: &Region,
+    params: &ThinParams,
+    lost: &mut LostArea,
+) -> Vec<Vec<AxisPoint>> {
+    // Corners beside walls taper to nothing: an opening of the least width removes them, and with
+    // them the triangles that would cost most.
+    let wide_enough = region.opened(params.least_width / 2.0);
+    lost.add(&region.difference(&wide_enough.outset(params.least_width / 2.0)));
+    let mut found = Vec::new();
+    for island in wide_enough.islands() {
+        let axes = axes_of_island(island, params);
+        if axes.is_empty() {
+            lost.add(&Region::from_island(island.clone()));
+        }
+        found.extend(axes);
+    }
+    found
+}
+
+fn axes_of_island(island: &Island, params: &ThinParams) -> Vec<Vec<AxisPoint>> {
+    let rings: Vec<Vec<Point2<f64>>> = island.iter().map(|ring| densified(ring)).collect();
+    // Rings of a region never cross, so this fails only on rings that touch along a side within a
+    // grid step; such a sliver has no axis worth laying.
+    let Ok(triangles) = triangulate(&rings) else { return Vec::new() };
+    let points: Vec<Point2<f64>> = rings.into_iter().flatten().collect();
+    let width_at = |p: &Point2<f64>| {
+        2.0 * island
+            .iter()
+            .flat_map(|ring| ring_sides(ring))
+            .map(|(a, b)| distance_to_segment(&mm(a), &mm(b), p))
+            .fold(f64::INFINITY, f64::min)
+    };
+    let graph = AxisGraph::new(&triangles, &points, width_at);
+    graph
+        .branches()
+        .into_iter()
+        .flat_map(|branch| printable_pieces(&branch, params))
+        .map(|piece| simplified(&piece))
+        .filter(|piece| {
+            let length: f64 = piece.windows(2).map(|w| distance(&w[0].at, &w[1].at)).sum();
+            length >= LEAST_LENGTH_IN_WIDTHS * piece[0].width
+        })
+        .collect()
+}
+
+/// The ring in mm, with points no farther apart than [`RIM_STEP_MM`].
+fn densified(ring: &[geom::grid::GridPoint]) -> Vec<Point2<f64>> {
+    let mut points = Vec::new();
+    for (a, b) in ring_sides(ring) {
+        let (a, b) = (mm(a), mm(b));
+        let pieces = (distance(&a, &b) / RIM_STEP_MM).ceil().max(1.0);
+        for k in 0..pieces as u32 {
+            points.push(a + (b - a) * (f64::from(k) / pieces));
+        }
+    }
+    points
+}
+
+/// The chordal axis: nodes joined by links.
+struct AxisGraph {
+    nodes: Vec<AxisPoint>,
+    /// Links of each node, ascending.
+    links: Vec<Vec<usize>>,
+}
+
+impl AxisGraph {
+    fn new(
+        triangles: &Triangulation,
+        points: &[Point2<f64>],
+        width_at: impl Fn(&Point2<f64>) -> f64,
+    ) -> Self {
+        let mut graph = Self { nodes: Vec::new(), links: Vec::new() };
+        // One node for each side between two triangles, made when its first triangle is met.
+        let mut side_node = vec![[None; 3]; triangles.triangles.len()];
+        for (t, (corners, neighbours)) in
+            triangles.triangles.iter().zip(&triangles.neighbours).enumerate()
+        {
+            let mut inner_sides = Vec::new();
+            for k in 0..3 {
+                let Some(other) = neighbours[k] else { continue };
+                let node = *side_node[t][k].get_or_insert_with(|| {
+                    let ends = [corners[k], corners[(k + 1) % 3]].map(|c| points[c as usize]);
+                    graph.add(center(&ends[0], &ends[1]), &width_at)
+                });
+                let back = triangles.neighbours[other as usize]
+                    .iter()
+                    .position(|&n| n == Some(t as u32))
+                    .expect("neighbours are mutual");
+                side_node[other as usize][back] = Some(node);
+                inner_sides.push(node);
+            }
+            match inner_sides[..] {
+                [a, b] => graph.link(a, b),
+                [a, b, c] => {
+                    let middle = (graph.nodes[a].at.coords
+                        + graph.nodes[b].at.coords
+                        + graph.nodes[c].at.coords)
+                        / 3.0;
+                    let hub = graph.add(middle.into(), &width_at);
+                    for side in [a, b, c] {
+                        graph.link(hub, side);
+                    }
+                }
+                _ => {}
+            }
+        }
+        graph
+    }
+
+    fn add(&mut self, at: Point2<f64>, width_at: &impl Fn(&Point2<f64>) -> f64) -> usize {
+        self.nodes.push(AxisPoint { at, width: width_at(&at) });
+        self.links.push(Vec::new());
+        self.nodes.len() - 1
+    }
+
+    fn link(&mut self, a: usize, b: usize) {
+        self.links[a].push(b);
+        self.links[b].push(a);
+    }
+
+    /// Takes the graph apart into lines between hubs and ends, without the short branches that
+    /// lead into corners.
+    fn branches(mut self) -> Vec<Vec<AxisPoint>> {
+        self.prune();
+        let mut used: Vec<Vec<bool>> = self.links.iter().map(|l| vec![false; l.len()]).collect();
+        let mut lines = Vec::new();
+        let is_through = |links: &[Vec<usize>], node: usize| links[node].len() == 2;
+        // Lines from ends and hubs first; what is left are closed loops, begun anywhere.
+        for closed_pass in [false, true] {
+            for start in 0..self.nodes.len() {
+                if !closed_pass && is_through(&self.links, start) {
+                    continue;
+                }
+                for first in 0..self.links[start].len() {
+                    if used[start][first] {
+                        continue;
+                    }
+                    lines.push(self.walk(start, first, &mut used));
+                }
+            }
+        }
+        lines
+    }
+
+    /// Follows a line from `start` along its link number `first` to the next hub, end, or back.
+    fn walk(&self, start: usize, first: usize, used: &mut [Vec<bool>]) -> Vec<AxisPoint> {
+        let mut line = vec![self.nodes[start]];
+        let (mut from, mut slot) = (start, first);
+        loop {
+            used[from][slot] = true;
+            let to = self.links[from][slot];
+            let back = (0..self.links[to].len())
+                .find(|&k| self.links[to][k] == from && !used[to][k])
+                .expect("links are mutual");
+            used[to][back] = true;
+            line.push(self.nodes[to]);
+            let onward = (0..self.links[to].len()).find(|&k| !used[to][k]);
+            match onward {
+                Some(next) if self.links[to].len() == 2 && to != start => {
+                    (from, slot) = (to, next);
+                }
+                _ => return line,
+            }
+        }
+    }
+
+    /// Cuts off branches from a hub to an end that are shorter than the place is wide at the hub.
+    fn prune(&mut self) {
+        for end in 0..self.nodes.len() {
+            if self.links[end].len() != 1 {
+                continue;
+            }
+            let mut path = vec![end];
+            let mut length = 0.0;
+            let mut at = end;
+            while self.links[at].len() < 3 {
+                let previous = path.len().checked_sub(2).map(|k| path[k]);
+                let Some(&next) = self.links[at].iter().find(|&&n| Some(n) != previous) else {
+                    break;
+                };
+                length += distance(&self.nodes[at].at, &self.nodes[next].at);
+                path.push(next);
+                at = next;
+            }
+            if self.links[at].len() >= 3 && length < self.nodes[at].width {
+                for pair in path.windows(2) {
+                    self.links[pair[0]].retain(|&n| n != pair[1]);
+                    self.links[pair[1]].retain(|&n| n != pair[0]);
+                }
+            }
+        }
+    }
+}
+
+/// The pieces of an axis where the place is wide enough for a bead, widths capped.
+fn printable_pieces(line: &[AxisPoint], params: &ThinParams) -> Vec<Vec<AxisPoint>> {
+    // A shade below the least width: an opening leaves places of just that width.
+    let least = params.least_width * 0.99;
+    line.chunk_by(|a, b| (a.width >= least) == (b.width >= least))
+        .filter(|piece| piece[0].width >= least && piece.len() >= 2)
+        .map(|piece| {
+            let cap = |p: &AxisPoint| AxisPoint { width: p.width.min(params.greatest_width), ..*p };
+            piece.iter().map(cap).collect()
+        })
+        .collect()
+}
+
+fn simplified(line: &[AxisPoint]) -> Vec<AxisPoint> {
+    let mut keep = vec![false; line.len()];
+    keep[0] = true;
+    keep[line.len() - 1] = true;
+    let off = |a: usize, b: usize, p: usize| {
+        let (a, b, p) = (&line[a], &line[b], &line[p]);
+        let share = share_nearest(&a.at, &b.at, &p.at);
+        let at = a.at + (b.at - a.at) * share;
+        let half_width = (a.width + (b.width - a.width) * share - p.width) / 2.0;
+        (p.at - at).norm_squared() + half_width * half_width
+    };
+    mark_kept(0, line.len() - 1, AXIS_TOLERANCE_MM * AXIS_TOLERANCE_MM, off, &mut keep);
+    line.iter().zip(keep).filter(|(_, keep)| *keep).map(|(p, _)| *p).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geom::region::Fill;
+    use std::f64::consts::TAU;
+
+    const PARAMS: ThinParams = ThinParams { least_width: 0.2, greatest_width: 0.8 };
+
+    fn polygon(points: &[[f64; 2]]) -> Region {
+        let ring: Vec<Point2<f64>> = points.iter().map(|&p| Point2::from(p)).collect();
+        Region::from_rings([ring.as_slice()], Fill::NonZero)
+    }
+
+    fn length(line: &[AxisPoint]) -> f64 {
+        line.windows(2).map(|w| distance(&w[0].at, &w[1].at)).sum()
+    }
+
+    fn area(lines: &[Vec<AxisPoint>]) -> f64 {
+        lines
+            .iter()
+            .flat_map(|line| line.windows(2))
+            .map(|w| distance(&w[0].at, &w[1].at) * f64::midpoint(w[0].width, w[1].width))
+            .sum()
+    }
+
+    #[test]
+    fn a_strip_has_one_line_down_its_middle() {
+        let strip = polygon(&[[0.0, 0.0], [12.0, 0.0], [12.0, 0.5], [0.0, 0.5]]);
+        let lines = axes(&strip, &PARAMS, &mut LostArea::default());
+        assert_eq!(lines.len(), 1);
+        assert!(lines[0].len() <= 12, "{} points on a straight line", lines[0].len());
+        assert!(length(&lines[0]) > 11.3 && length(&lines[0]) <= 12.1, "{}", length(&lines[0]));
+        for p in &lines[0] {
+            let near_end = p.at.x.min(12.0 - p.at.x) < 0.3;
+            assert!((p.at.y - 0.25).abs() < 0.02 || near_end, "{p:?}");
+            assert!(p.width <= 0.5 + 1e-9, "{p:?}");
+        }
+    }
+
+    #[test]
+    fn a_wedge_is_filled_where_a_bead_fits() {
+        let wedge = polygon(&[[0.0, 0.0], [20.0, -0.35], [20.0, 0.35]]);
+        let mut lost = LostArea::default();
+        let lines = axes(&wedge, &PARAMS, &mut lost);
+        assert_eq!(lines.len(), 1);
+        let narrowest = lines[0].iter().map(|p| p.width).fold(f64::INFINITY, f64::min);
+        assert!((0.19..0.25).contains(&narrowest), "{narrowest}");
+        // Of 7 mm² the tip below the least width, 0.57 mm², is out of reach.
+        let filled = area(&lines);
+        assert!((5.8..6.5).contains(&filled), "{filled}");
+        assert!(lost.area > 0.1, "{lost:?}");
+    }
+
+    #[test]
+    fn a_ring_gives_a_closed_line() {
+        let circle = |radius: f64| -> Vec<[f64; 2]> {
+            (0..90)
+                .map(|i| {
+                    let angle = f64::from(i) * TAU / 90.0;
+                    [radius * angle.cos(), radius * angle.sin()]
+                })
+                .collect()
+        };
+        let ring = polygon(&circle(5.2)).difference(&polygon(&circle(4.8)));
+        let lines = axes(&ring, &PARAMS, &mut LostArea::default());
+        let total: f64 = lines.iter().map(|line| length(line)).sum();
+        assert!((total - TAU * 5.0).abs() < 0.3, "{total}");
+    }
+
+    #[test]
+    fn a_cross_of_strips_keeps_its_four_arms() {
+        let across = polygon(&[[-6.0, -0.2], [6.0, -0.2], [6.0, 0.2], [-6.0, 0.2]]);
+        let along = polygon(&[[-0.2, -6.0], [0.2, -6.0], [0.2, 6.0], [-0.2, 6.0]]);
+        let lines = axes(&across.union(&along), &PARAMS, &mut LostArea::default());
+        let total: f64 = lines.iter().map(|line| length(line)).sum();
+        assert!((total - 23.5).abs() < 1.0, "{total}");
+    }
+
+    #[test]
+    fn what_no_bead_fits_in_is_counted() {
+        let hair = polygon(&[[0.0, 0.0], [12.0, 0.0], [12.0, 0.1], [0.0, 0.1]]);
+        let mut lost = LostArea::default();
+        assert!(axes(&hair, &PARAMS, &mut lost).is_empty());
+        assert!((lost.area - 1.2).abs() < 1e-6);
+        assert!(lost.worst.is_some());
+    }
+}

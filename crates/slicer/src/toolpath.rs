@@ -1,0 +1,136 @@
+//! What the slicer hands on: lines of material in the part frame.
+
+use geom::region::Region;
+use nalgebra::{Point2, Point3};
+
+use crate::bead::Bead;
+
+/// What a line of material is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Role {
+    /// The wall that is seen.
+    ExternalPerimeter,
+    /// A wall behind it.
+    Perimeter,
+    /// Sparse infill.
+    InternalInfill,
+    /// Solid infill that ends up inside or on the bed.
+    SolidInfill,
+    /// Solid infill that is seen from above.
+    TopSolidInfill,
+    /// A bead between walls, of the width that is left there.
+    GapFill,
+    /// Skirt or brim.
+    SkirtBrim,
+}
+
+/// A point of a line and the bead there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Station {
+    /// Where the tip of the nozzle passes, part frame, mm: on the upper side of the bead.
+    pub at: Point3<f64>,
+    /// The bead.
+    pub bead: Bead,
+}
+
+/// A line of material. Between stations the line is straight and the bead changes evenly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Toolpath {
+    /// What it is for.
+    pub role: Role,
+    /// Whether it ends where it begins; the first station is not repeated.
+    pub closed: bool,
+    /// At least two stations, or three when closed.
+    pub stations: Vec<Station>,
+}
+
+impl Toolpath {
+    /// Returns the length of the line, mm.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        self.sides().map(|(a, b)| (b.at - a.at).norm()).sum()
+    }
+
+    /// Returns the volume of the line, mm³.
+    #[must_use]
+    pub fn volume(&self) -> f64 {
+        self.sides()
+            .map(|(a, b)| (b.at - a.at).norm() * f64::midpoint(a.bead.area(), b.bead.area()))
+            .sum()
+    }
+
+    /// Returns the pieces between neighbouring stations, the closing one included.
+    pub fn sides(&self) -> impl Iterator<Item = (&Station, &Station)> {
+        let closing = self.closed.then(|| self.stations.first()).flatten();
+        self.stations.iter().zip(self.stations.iter().skip(1).chain(closing))
+    }
+}
+
+/// The walls that follow one outline of an island: the external one and those behind it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct WallGroup {
+    /// Closed loops, the external one first, then inwards. Empty only in an empty group.
+    pub loops: Vec<Toolpath>,
+}
+
+/// Everything to be laid in one island of a layer.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct IslandPaths {
+    /// The island itself, in the chart of the layer: travel inside it crosses no outline.
+    pub outline: Region,
+    /// Walls by outline: that of the island, then its holes.
+    pub walls: Vec<WallGroup>,
+    /// Infill and gap fill.
+    pub fills: Vec<Toolpath>,
+}
+
+/// Everything to be laid in one layer.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LayerPaths {
+    /// Counted from 0.
+    pub index: usize,
+    /// Level of its upper side, mm.
+    pub upper: f64,
+    /// Nominal thickness, mm.
+    pub thickness: f64,
+    /// Skirt and brim, before all else.
+    pub adhesion: Vec<Toolpath>,
+    /// The islands.
+    pub islands: Vec<IslandPaths>,
+    /// What could not be filled.
+    pub lost: LostArea,
+}
+
+/// Area of a layer that no bead fits in.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LostArea {
+    /// mm².
+    pub area: f64,
+    /// Where the largest piece lies, in the chart.
+    pub worst: Option<Point2<f64>>,
+    /// The area of that piece, mm².
+    pub worst_area: f64,
+}
+
+impl LostArea {
+    /// Counts the islands of `region` as lost.
+    pub(crate) fn add(&mut self, region: &Region) {
+        for island in region.islands() {
+            let area: f64 = island.iter().map(|ring| geom::region::signed_area(ring)).sum();
+            self.area += area;
+            if area > self.worst_area {
+                self.worst_area = area;
+                self.worst =
+                    island.first().and_then(|ring| ring.first()).map(|&p| geom::grid::mm(p));
+            }
+        }
+    }
+
+    /// Adds what another part of the layer lost.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.area += other.area;
+        if other.worst_area > self.worst_area {
+            (self.worst, self.worst_area) = (other.worst, other.worst_area);
+        }
+    }
+}
