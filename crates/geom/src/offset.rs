@@ -22,24 +22,29 @@ use crate::region::{Fill, Region, Ring, signed_area};
 /// (their budget is 4 µm rms); smaller multiplies the points of every later step.
 pub const ARC_TOLERANCE_MM: f64 = 0.001;
 
+/// The same for [`Region::opened`], which looks for places and does not draw them: a tenth of the
+/// points of exact arcs, which every later step would pay for.
+pub const OPENING_TOLERANCE_MM: f64 = 0.01;
+
 impl Region {
     /// Returns the points of the region at least `distance` (mm, not negative) from its border.
     #[must_use]
     pub fn inset(&self, distance: f64) -> Self {
-        self.shifted(distance)
+        self.shifted(distance, ARC_TOLERANCE_MM)
     }
 
     /// Returns the points at most `distance` (mm, not negative) from the region; its convex
     /// corners become round.
     #[must_use]
     pub fn outset(&self, distance: f64) -> Self {
-        self.shifted(-distance)
+        self.shifted(-distance, ARC_TOLERANCE_MM)
     }
 
-    /// Returns the part of the region that a disc of `radius` (mm) inside it can sweep.
+    /// Returns the part of the region that a disc of `radius` (mm) inside it can sweep, to within
+    /// [`OPENING_TOLERANCE_MM`].
     #[must_use]
     pub fn opened(&self, radius: f64) -> Self {
-        self.inset(radius).outset(radius)
+        self.shifted(radius, OPENING_TOLERANCE_MM).shifted(-radius, OPENING_TOLERANCE_MM)
     }
 
     /// Returns the inset and the area (mm²) over which its border ran into itself: zero, up to
@@ -48,7 +53,7 @@ impl Region {
     /// That area is what the raw rings enclose with the wrong winding; it costs nothing to know.
     #[must_use]
     pub fn inset_with_loss(&self, distance: f64) -> (Self, f64) {
-        let raw = self.raw_rings(distance);
+        let raw = self.raw_rings(distance, ARC_TOLERANCE_MM);
         let enclosed: f64 = raw.iter().map(|ring| signed_area(ring)).sum();
         let inset = Self::from_grid_rings(&raw, Fill::Positive);
         let lost = inset.area() - enclosed;
@@ -56,16 +61,17 @@ impl Region {
     }
 
     /// Moves the border to the left of its direction, that is inwards, by `shift` mm.
-    fn shifted(&self, shift: f64) -> Self {
+    fn shifted(&self, shift: f64, arc_tolerance: f64) -> Self {
         if self.is_empty() || shift == 0.0 {
             return self.clone();
         }
-        Self::from_grid_rings(&self.raw_rings(shift), Fill::Positive)
+        Self::from_grid_rings(&self.raw_rings(shift, arc_tolerance), Fill::Positive)
     }
 
-    fn raw_rings(&self, shift: f64) -> Vec<Ring> {
+    fn raw_rings(&self, shift: f64, arc_tolerance: f64) -> Vec<Ring> {
         debug_assert!(shift.is_finite());
-        self.rings().map(|ring| raw_ring(ring, shift * STEPS_PER_MM)).collect()
+        let steps = |length: f64| length * STEPS_PER_MM;
+        self.rings().map(|ring| raw_ring(ring, steps(shift), steps(arc_tolerance))).collect()
     }
 }
 
@@ -102,7 +108,8 @@ impl Corner {
     }
 }
 
-fn raw_ring(ring: &[GridPoint], shift: f64) -> Ring {
+/// The raw ring of one ring; all lengths in grid steps.
+fn raw_ring(ring: &[GridPoint], shift: f64, arc_tolerance: f64) -> Ring {
     let count = ring.len();
     let float = |p: GridPoint| Point2::new(f64::from(p.x), f64::from(p.y));
     let sides: Vec<Side> = (0..count)
@@ -135,13 +142,13 @@ fn raw_ring(ring: &[GridPoint], shift: f64) -> Ring {
     let mut raw = Vec::with_capacity(count + count / 4);
     for (i, corner) in corners.iter().enumerate() {
         let both_fit = fits[(i + count - 1) % count] && fits[i];
-        join(corner, shift, both_fit, &mut raw);
+        join(corner, shift, arc_tolerance, both_fit, &mut raw);
     }
     raw
 }
 
 /// Appends the raw ring's points at one corner.
-fn join(corner: &Corner, shift: f64, sides_fit: bool, raw: &mut Ring) {
+fn join(corner: &Corner, shift: f64, arc_tolerance: f64, sides_fit: bool, raw: &mut Ring) {
     let mut push = |p: Point2<f64>| {
         // The sum of a grid coordinate and an offset, both far below 2^31.
         raw.push(GridPoint::new(p.x.round() as i32, p.y.round() as i32));
@@ -159,7 +166,7 @@ fn join(corner: &Corner, shift: f64, sides_fit: bool, raw: &mut Ring) {
     }
     let (cos, sin) = corner.turn;
     let radius = shift.abs();
-    let tolerance = (ARC_TOLERANCE_MM * STEPS_PER_MM).min(radius / 2.0);
+    let tolerance = arc_tolerance.min(radius / 2.0);
     // The crossing lies radius·(1/cos(turn/2) − 1) outside the arc.
     let cos_half = ((1.0 + cos) / 2.0).max(0.0).sqrt();
     if radius * (1.0 - cos_half) <= tolerance * cos_half {

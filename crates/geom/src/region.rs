@@ -205,6 +205,25 @@ impl Region {
         Self::from_grid_rings(&rings, Fill::Positive)
     }
 
+    /// Returns the region with rings thinned out to within `tolerance` (mm), and nothing resolved:
+    /// rings closer than that may touch or cross. For regions that go into a boolean or an offset
+    /// next, which resolve it, and never out to toolpaths.
+    #[must_use]
+    pub fn thinned(&self, tolerance: f64) -> Self {
+        let thin = |island: &Island| -> Island {
+            let mut rings: Island =
+                island.iter().map(|ring| simplify_ring(ring, tolerance)).collect();
+            // An outer ring that collapsed takes its holes along.
+            if rings.first().is_none_or(|outer| outer.len() < 3) {
+                rings.clear();
+            }
+            rings.retain(|ring| ring.len() >= 3);
+            rings
+        };
+        let islands = self.islands.iter().map(thin).filter(|island| !island.is_empty());
+        Self { islands: islands.collect() }
+    }
+
     /// Returns the islands that `keep` accepts.
     #[must_use]
     pub fn filtered(&self, keep: impl Fn(&&Island) -> bool) -> Self {

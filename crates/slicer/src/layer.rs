@@ -8,7 +8,7 @@ use crate::adhesion::{AdhesionParams, around};
 use crate::bead::Bead;
 use crate::infill::{FillLayer, FillLine, InfillParams, fill};
 use crate::level::Level;
-use crate::skins::{Neighbours, SkinParams, skins};
+use crate::skins::{Neighbours, SKIN_TOLERANCE_MM, SkinParams, skins};
 use crate::surface::LayerSurface;
 use crate::thin::{ThinParams, axes};
 use crate::toolpath::{IslandPaths, LayerPaths, LostArea, Role, Station, Toolpath, WallGroup};
@@ -93,7 +93,8 @@ fn fill_island(
     let solid_bead = Bead { width: params.infill.solid_width, thickness };
     let split = split_thin(&walls.interior, solid_bead.spacing() / 2.0);
     let layer = FillLayer { index: lift.level.index, thickness, tolerance: params.tolerance };
-    let skins = skins(&split.thick, neighbours, solid_bead.spacing(), &params.skins);
+    let interior = split.thick.thinned(SKIN_TOLERANCE_MM);
+    let skins = skins(&interior, neighbours, solid_bead.spacing(), &params.skins);
     let filling = fill(&skins, &layer, &params.infill);
 
     let mut thin = walls.thin;

@@ -13,7 +13,7 @@ pub mod bead;
 pub mod infill;
 pub mod layer;
 pub mod level;
-// pub mod section;
+pub mod section;
 pub mod skins;
 pub mod surface;
 pub mod thin;

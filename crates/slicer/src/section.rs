@@ -67,9 +67,9 @@ impl<'a> Cutter<'a> {
     pub fn new(solid: &'a Solid, surface: &'a dyn LayerSurface, levels: &[Level]) -> Self {
         let cuts: Vec<f64> = levels.iter().map(Level::middle).collect();
         let vertex_levels: Vec<f64> =
-            solid.mesh.vertices.par_iter().map(|p| surface.level(p)).collect();
+            solid.mesh().vertices.par_iter().map(|p| surface.level(p)).collect();
         let ranges: Vec<(u32, u32)> = solid
-            .mesh
+            .mesh()
             .triangles
             .par_iter()
             .map(|corners| crossed(&cuts, corners.map(|v| vertex_levels[v as usize])))
@@ -98,7 +98,7 @@ impl<'a> Cutter<'a> {
     /// `tolerance` mm.
     #[must_use]
     pub fn section(&self, k: usize, tolerance: f64) -> Section {
-        let (chains, mut tears) = self.outlines(k);
+        let (chains, tears) = self.outlines(k);
         let mut rings: Vec<Ring> = Vec::new();
         for chain in chains {
             // Points that fall on the same place of the grid would be corners without direction.
@@ -112,7 +112,6 @@ impl<'a> Cutter<'a> {
                 rings.push(ring);
             }
         }
-        tears.widest = tears.widest.max(0.0);
         Section { region: Region::from_grid_rings(&rings, Fill::NonZero), tears }
     }
 
@@ -145,12 +144,12 @@ impl<'a> Cutter<'a> {
 
     /// How the outline passes through a facet; `None` when it does not.
     fn step(&self, facet: u32, cut: f64) -> Option<Step> {
-        let corners = self.solid.mesh.triangles[facet as usize];
+        let corners = self.solid.mesh().triangles[facet as usize];
         let below = corners.map(|v| self.vertex_levels[v as usize] < cut);
-        let sides = self.solid.sides[facet as usize];
-        // Counter-clockwise from outside, material below the level: the outline enters where the
-        // walk round the facet comes up from below... seen from above that is reversed, and keeps
-        // the material to the left.
+        let sides = self.solid.sides()[facet as usize];
+        // Walking round the facet counter-clockwise seen from outside, the level is left behind
+        // through `up` and met again through `down`. The outline runs the other way, which seen
+        // from above keeps the material to its left.
         let up = (0..3).find(|&k| below[k] && !below[(k + 1) % 3])?;
         let down = (0..3).find(|&k| !below[k] && below[(k + 1) % 3])?;
         Some(Step { enter: sides[down], leave: sides[up] })
@@ -183,11 +182,11 @@ impl<'a> Cutter<'a> {
 
     /// Where cut `k` crosses a side, in the chart.
     fn point(&self, side: u32, k: usize) -> GridPoint {
-        let [low, high] = self.solid.side_ends(side);
+        let [low, high] = self.solid.ends(side);
         let (a, b) = (self.vertex_levels[low as usize], self.vertex_levels[high as usize]);
         let share = ((self.cuts[k] - a) / (b - a)).clamp(0.0, 1.0);
         let (p, q) =
-            (self.solid.mesh.vertices[low as usize], self.solid.mesh.vertices[high as usize]);
+            (self.solid.mesh().vertices[low as usize], self.solid.mesh().vertices[high as usize]);
         snap(&self.surface.flatten(&Point3::from(p.coords.lerp(&q.coords, share))))
     }
 }

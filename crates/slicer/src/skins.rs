@@ -1,14 +1,12 @@
 //! Which part of an island's interior is solid: bottoms, tops and the layers behind them.
 //!
 //! A place stays sparse only when it is covered by every one of the next `top_layers` layers above
-//! and `bottom_layers` below; everything else is solid. All those layers and the interior are laid
-//! over each other in one sweep.
+//! and `bottom_layers` below; everything else is solid.
 //!
 //! Slivers change sides so that both kinds can be filled: sparse places into which no line fits
 //! become solid, and solid places thinner than a bead become sparse.
 
-use geom::grid::GridPoint;
-use geom::region::{GridBounds, Island, Region};
+use geom::region::Region;
 
 /// How many layers close the part, and when a small place is not worth leaving sparse.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,6 +42,18 @@ pub struct Neighbours<'a> {
     pub below: Vec<&'a Region>,
 }
 
+/// How closely skins follow outlines, mm: lines that begin 10 µm sooner or later are the same lines,
+/// and every step here costs in proportion to the points of its outlines.
+pub const SKIN_TOLERANCE_MM: f64 = 0.01;
+
+/// Solid places thinner than about one spacing hold no line: half of that, less what rounding may
+/// take, is the radius of the disc that must fit.
+const LEAST_SOLID_SHARE: f64 = 0.49;
+
+/// Area that a layer may take from the interior and still count as covering it, mm²: what
+/// simplified outlines of a vertical wall differ by.
+const NEGLIGIBLE_MM2: f64 = 0.01;
+
 /// Takes an island's interior apart; `spacing` is that of the solid lines, mm.
 #[must_use]
 pub fn skins(
@@ -52,32 +62,25 @@ pub fn skins(
     spacing: f64,
     params: &SkinParams,
 ) -> Skins {
-    let Some(bounds) = interior.bounds() else { return Skins::default() };
-    let covered = |layers: &[&Region], wanted: usize| -> Option<Vec<Region>> {
-        (layers.len() >= wanted)
-            .then(|| layers[..wanted].iter().map(|layer| near(layer, &bounds)).collect())
-    };
-    let sparse = match (
-        covered(&neighbours.above, params.top_layers),
-        covered(&neighbours.below, params.bottom_layers),
-    ) {
-        (Some(above), Some(below)) if !params.all_solid => {
-            let layers: Vec<&Region> =
-                std::iter::once(interior).chain(&above).chain(&below).collect();
-            Region::common_to(&layers)
-        }
-        _ => Region::default(),
-    };
-    let open_above = exposed(interior, neighbours.above.first().copied(), &bounds, spacing);
-    let sparse = if sparse.is_empty() {
-        sparse
+    if interior.is_empty() {
+        return Skins::default();
+    }
+    let above = Cover::new(interior, &neighbours.above, params.top_layers, spacing);
+    let sparse = if params.all_solid || !above.is_complete {
+        Region::default()
     } else {
-        let open_below = exposed(interior, neighbours.below.first().copied(), &bounds, spacing);
-        sparse
-            .difference(&open_above)
-            .difference(&open_below)
-            .opened(spacing)
-            .without_small_islands(params.solid_below_area)
+        let below = Cover::new(interior, &neighbours.below, params.bottom_layers, spacing);
+        if below.is_complete {
+            above
+                .common
+                .intersection(&below.common)
+                .difference(&above.open)
+                .difference(&below.open)
+                .opened(spacing)
+                .without_small_islands(params.solid_below_area)
+        } else {
+            Region::default()
+        }
     };
     let (solid, sparse) = if sparse.is_empty() {
         (interior.clone(), sparse)
@@ -86,45 +89,49 @@ pub fn skins(
         let sparse = interior.difference(&solid);
         (solid, sparse)
     };
-    if open_above.is_empty() || params.top_layers == 0 {
+    if above.open.is_empty() || params.top_layers == 0 {
         return Skins { top: Region::default(), solid, sparse };
     }
-    Skins { top: solid.intersection(&open_above), solid: solid.difference(&open_above), sparse }
+    Skins { top: solid.intersection(&above.open), solid: solid.difference(&above.open), sparse }
 }
 
-/// Solid places thinner than about one spacing hold no line: half of that, less what rounding may
-/// take, is the radius of the disc that must fit.
-const LEAST_SOLID_SHARE: f64 = 0.49;
-
-/// What of the interior the next layer does not cover, grown by two lines: the walls of the next
-/// layer, which run along its edge, then stand on solid ground.
-fn exposed(interior: &Region, next: Option<&Region>, bounds: &GridBounds, spacing: f64) -> Region {
-    let Some(next) = next else { return interior.clone() };
-    let open = interior.difference(&near(next, bounds)).opened(spacing / 2.0);
-    if open.is_empty() { open } else { open.outset(2.0 * spacing).intersection(interior) }
+/// How the layers on one side cover an interior.
+struct Cover {
+    /// Whether there are as many layers as are asked for.
+    is_complete: bool,
+    /// What all of them cover.
+    common: Region,
+    /// What the nearest leaves open, grown by two lines: the walls of that layer, which run along
+    /// the edge, then stand on solid ground.
+    open: Region,
 }
 
-/// The islands of a region whose boxes meet `bounds`.
-fn near(region: &Region, bounds: &GridBounds) -> Region {
-    let meets = |island: &&Island| {
-        let outer = island.first().map_or(&[][..], Vec::as_slice);
-        let (min, max) = corners(outer);
-        min.x <= bounds.max.x
-            && bounds.min.x <= max.x
-            && min.y <= bounds.max.y
-            && bounds.min.y <= max.y
-    };
-    region.filtered(meets)
-}
-
-fn corners(ring: &[GridPoint]) -> (GridPoint, GridPoint) {
-    let start = (GridPoint::new(i32::MAX, i32::MAX), GridPoint::new(i32::MIN, i32::MIN));
-    ring.iter().fold(start, |(min, max), p| {
-        (
-            GridPoint::new(min.x.min(p.x), min.y.min(p.y)),
-            GridPoint::new(max.x.max(p.x), max.y.max(p.y)),
-        )
-    })
+impl Cover {
+    fn new(interior: &Region, layers: &[&Region], wanted: usize, spacing: f64) -> Self {
+        let is_complete = layers.len() >= wanted;
+        let Some(nearest) = layers.first() else {
+            return Self { is_complete, common: Region::default(), open: interior.clone() };
+        };
+        let mut common = interior.intersection(nearest);
+        let open = if interior.area() - common.area() <= NEGLIGIBLE_MM2 {
+            Region::default()
+        } else {
+            let bare = interior.difference(nearest).opened(spacing / 2.0);
+            if bare.is_empty() { bare } else { bare.outset(2.0 * spacing).intersection(interior) }
+        };
+        if wanted == 0 {
+            return Self { is_complete, common: interior.clone(), open: Region::default() };
+        }
+        if is_complete {
+            for pair in layers[..wanted].windows(2) {
+                // Layers of an upright wall are equal to the last bit.
+                if pair[0] != pair[1] && !common.is_empty() {
+                    common = common.intersection(pair[1]);
+                }
+            }
+        }
+        Self { is_complete, common, open }
+    }
 }
 
 #[cfg(test)]

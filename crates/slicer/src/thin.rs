@@ -34,9 +34,9 @@ pub(crate) struct AxisPoint {
     pub(crate) width: f64,
 }
 
-/// Distance of points on the densified rings, mm: about half of the thinnest bead, so that sides of
-/// the triangulation cross from rim to rim and not along it.
-const RIM_STEP_MM: f64 = 0.15;
+/// Distance of points on the densified rings, mm: as the thinnest bead is wide, so that sides of the
+/// triangulation cross from rim to rim and not along it.
+const RIM_STEP_MM: f64 = 0.2;
 
 /// How much an axis may be simplified, mm, in place and in half its width alike.
 const AXIS_TOLERANCE_MM: f64 = 0.01;

@@ -13,7 +13,7 @@
 
 use geom::grid::mm;
 use geom::polyline::nearest_on_ring;
-use geom::region::{Region, Ring, signed_area};
+use geom::region::{Island, Region, Ring, ring_length, signed_area};
 use nalgebra::Point2;
 
 use crate::bead::Bead;
@@ -65,6 +65,10 @@ pub struct Walls {
 /// short sides at noisy corners stay below; a wall that is 10 µm too thin over 1 mm is above.
 const NEGLIGIBLE_LOSS_MM2: f64 = 0.01;
 
+/// How closely walls behind the outermost follow the outline, mm: nobody sees them, and their
+/// points are paid for in every step to come.
+const INNER_TOLERANCE_MM: f64 = 0.005;
+
 /// Returns the walls of one island (a region with a single outer ring) for beads `thickness` thick.
 #[must_use]
 pub fn walls(island: &Region, thickness: f64, params: &WallParams) -> Walls {
@@ -88,7 +92,7 @@ pub fn walls(island: &Region, thickness: f64, params: &WallParams) -> Walls {
             let points = ring.iter().map(|&p| mm(p)).collect();
             add_to_group(&mut walls.groups, WallLoop { depth, points, bead }, is_hole(ring));
         }
-        walls.interior = left.core;
+        walls.interior = left.core.thinned(INNER_TOLERANCE_MM);
     }
     walls
 }
@@ -113,25 +117,45 @@ fn centreline(left: &Region, depth: usize, params: &WallParams, thickness: f64) 
 pub(crate) struct Split {
     /// At least twice the spacing thick.
     pub(crate) thick: Region,
-    /// The rest, without the corners that a round bead never fills.
+    /// The rest: places where a single bead may fit.
     pub(crate) thin: Region,
     /// What is farther than the spacing from the border of `thick`.
     pub(crate) core: Region,
 }
 
+/// How closely the border of thin places is known, mm. They are found by shrinking the region and
+/// growing it again, and arcs simplified this far cost a fraction of exact ones; a bead that ends
+/// 20 µm sooner or later is the same bead.
+const THIN_BORDER_MM: f64 = 0.02;
+
+/// Thin places into which no disc of this radius (mm) fits are the sharp corners of thick ones.
+const CORNER_RADIUS_MM: f64 = 0.09;
+
 /// Takes the places thinner than twice `spacing` out of a region.
 pub(crate) fn split_thin(region: &Region, spacing: f64) -> Split {
     let (core, loss) = region.inset_with_loss(spacing);
+    let whole = |core| Split { thick: region.clone(), thin: Region::default(), core };
     if loss <= NEGLIGIBLE_LOSS_MM2 {
-        return Split { thick: region.clone(), thin: Region::default(), core };
+        return whole(core);
     }
-    // Sharp convex corners reach farther from the core than the spacing; twice that keeps all
-    // corners over 30 degrees with the walls, at the price of walls that run on into a narrowing
-    // gap for a spacing.
-    let thick = region.intersection(&core.outset(2.0 * spacing));
-    let thin = region.difference(&core.outset(spacing));
+    let reached = core.thinned(THIN_BORDER_MM).outset(spacing + 2.0 * THIN_BORDER_MM);
+    let thin = region.difference(&reached).filtered(holds_a_disc);
+    if thin.is_empty() {
+        return whole(core);
+    }
+    let thick = region.difference(&thin);
     let core = thick.inset(spacing);
     Split { thick, thin, core }
+}
+
+fn holds_a_disc(island: &&Island) -> bool {
+    let (area, perimeter) = island.iter().fold((0.0, 0.0), |(area, perimeter), ring| {
+        (area + signed_area(ring), perimeter + ring_length(ring))
+    });
+    // The radius of a disc inside a convex area is at most twice its area by its perimeter; corner
+    // slivers fail that without further work.
+    2.0 * area >= CORNER_RADIUS_MM * perimeter
+        && !Region::from_island((*island).clone()).inset(CORNER_RADIUS_MM).is_empty()
 }
 
 /// Puts a loop behind the one that it follows: the nearest of the wall before, of its own kind.

@@ -3,8 +3,11 @@
 //! Neighbouring line ends on a ring can be joined by the piece of rim between them, on which no
 //! other line ends. A line is grown from its free end, always over the shorter of the two joins
 //! there that lead to a line not used yet; for parallel lines this yields the familiar zigzag, for
-//! pieces of a spiral its counterpart, with no special case for either. What is left over is
-//! joined shortest first, except where that would close a loop.
+//! pieces of a spiral its counterpart, with no special case for either. What is left over is joined shortest
+//! first, except where that would close a loop.
+//!
+//! Of the rim, joins take every other piece. An end that stays free can be given its share of the
+//! two pieces beside it, so that a solid area is filled to its corners.
 
 use geom::grid::mm;
 use geom::region::Region;
@@ -53,12 +56,25 @@ impl Made {
     }
 }
 
-/// Returns the chords joined along the rim of `core` by pieces of at most `longest` mm.
-pub(super) fn joined(core: &Region, chords: &[Chord], longest: f64) -> Vec<Vec<Point2<f64>>> {
+/// How lines may be joined.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct JoinParams {
+    /// The longest piece of rim that joins two ends, mm.
+    pub(super) longest: f64,
+    /// Whether free ends take their share of the rim.
+    pub(super) fill_rim: bool,
+}
+
+/// Returns the chords joined along the rim of `core`.
+pub(super) fn joined(
+    core: &Region,
+    chords: &[Chord],
+    params: &JoinParams,
+) -> Vec<Vec<Point2<f64>>> {
     let rings: Vec<Vec<Point2<f64>>> =
         core.rings().map(|ring| ring.iter().map(|&p| mm(p)).collect()).collect();
     let mut joins = possible_joins(&rings, chords);
-    joins.retain(|join| join.length <= longest);
+    joins.retain(|join| join.length <= params.longest);
     let mut at_end: Vec<[Vec<usize>; 2]> = vec![[Vec::new(), Vec::new()]; chords.len()];
     for (index, join) in joins.iter().enumerate() {
         for end in [join.from, join.to] {
@@ -77,14 +93,22 @@ pub(super) fn joined(core: &Region, chords: &[Chord], longest: f64) -> Vec<Vec<P
             grow((start, side), &joins, &at_end, &mut used, &mut made);
         }
     }
+    let stub = |end: End| -> Vec<Point2<f64>> {
+        let Some(rim) = chords[end.0].ends[end.1].filter(|_| params.fill_rim) else {
+            return Vec::new();
+        };
+        let beside = at_end[end.0][end.1].iter().map(|&index| &joins[index]);
+        free_end_share(&rings[rim.ring], &rim, end, beside)
+    };
     // Ties go by the order of the chords, which comes from the geometry alone.
-    joins.sort_unstable_by(|a, b| {
+    let mut by_length = joins.clone();
+    by_length.sort_unstable_by(|a, b| {
         a.length.total_cmp(&b.length).then((a.from, a.to).cmp(&(b.from, b.to)))
     });
-    for join in &joins {
+    for join in &by_length {
         made.make(join);
     }
-    chains(&rings, chords, &made.by_end)
+    chains(&rings, chords, &made.by_end, stub)
 }
 
 /// Grows a line from its free end over chords that are not used yet.
@@ -155,6 +179,7 @@ fn chains(
     rings: &[Vec<Point2<f64>>],
     chords: &[Chord],
     made: &[[Option<Join>; 2]],
+    stub: impl Fn(End) -> Vec<Point2<f64>>,
 ) -> Vec<Vec<Point2<f64>>> {
     let mut used = vec![false; chords.len()];
     let mut lines = Vec::new();
@@ -162,7 +187,8 @@ fn chains(
         let free = (0..2).find(|&k| made[start][k].is_none());
         let Some(mut entry) = free.filter(|_| !used[start]) else { continue };
         let mut at = start;
-        let mut line: Vec<Point2<f64>> = Vec::new();
+        let mut line: Vec<Point2<f64>> = stub((start, entry));
+        line.reverse();
         loop {
             used[at] = true;
             if entry == 0 {
@@ -171,7 +197,10 @@ fn chains(
                 line.extend(chords[at].points.iter().rev());
             }
             let exit = 1 - entry;
-            let Some(join) = made[at][exit] else { break };
+            let Some(join) = made[at][exit] else {
+                line.extend(stub((at, exit)));
+                break;
+            };
             let forwards = join.from == (at, exit);
             append_rim(rings, chords, &join, forwards, &mut line);
             (at, entry) = join.other((at, exit));
@@ -199,6 +228,61 @@ fn append_rim(
     if !forwards {
         line[start..].reverse();
     }
+}
+
+/// The rim that belongs to a free end: a quarter of the two pieces beside it, taken from the longer.
+fn free_end_share<'a>(
+    ring: &[Point2<f64>],
+    rim: &RimPoint,
+    end: End,
+    beside: impl Iterator<Item = &'a Join>,
+) -> Vec<Point2<f64>> {
+    let (mut ahead, mut behind) = (0.0, 0.0);
+    // A piece of rim between the two ends of one line has that line running along it.
+    for join in beside.filter(|join| join.from.0 != join.to.0) {
+        if join.from == end {
+            ahead = join.length;
+        } else {
+            behind = join.length;
+        }
+    }
+    let share = ((ahead + behind) / 4.0).min(f64::max(ahead, behind) / 2.0);
+    along_rim(ring, rim, share, ahead > behind)
+}
+
+/// The points of a ring from a place on it, `length` mm forwards or backwards.
+fn along_rim(
+    ring: &[Point2<f64>],
+    from: &RimPoint,
+    length: f64,
+    forwards: bool,
+) -> Vec<Point2<f64>> {
+    let count = ring.len();
+    let corner = |side: usize, k: usize| {
+        if forwards {
+            ring[(side + 1 + k) % count]
+        } else {
+            ring[(side + count - k % count) % count]
+        }
+    };
+    let (a, b) = (ring[from.side], ring[(from.side + 1) % count]);
+    let mut at = a + (b - a) * from.share;
+    let mut left = length;
+    let mut points = Vec::new();
+    for k in 0..count {
+        let next = corner(from.side, k);
+        let step = distance(&at, &next);
+        if step >= left {
+            if left > 0.0 {
+                points.push(at + (next - at) * (left / step));
+            }
+            break;
+        }
+        points.push(next);
+        left -= step;
+        at = next;
+    }
+    points
 }
 
 /// Which chords hang together already (union–find).

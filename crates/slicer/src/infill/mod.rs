@@ -18,6 +18,7 @@ use geom::simplify::simplify_line;
 use geom::spiral::Turning;
 use nalgebra::Point2;
 
+use self::link::JoinParams;
 use crate::bead::Bead;
 use crate::skins::Skins;
 use crate::toolpath::Role;
@@ -101,9 +102,12 @@ pub struct FillLayer {
 /// Lines shorter than this many widths are blobs and are left out.
 const LEAST_LENGTH_IN_WIDTHS: f64 = 0.5;
 
-/// Joins along the rim of a sparse area are material that no one asked for: up to this length
-/// they cost less than the travel and the retraction that they save, mm.
-const LONGEST_SPARSE_JOIN_MM: f64 = 10.0;
+/// In a solid area joins are part of the filling, however long.
+const SOLID_JOINS: JoinParams = JoinParams { longest: f64::INFINITY, fill_rim: true };
+
+/// Joins along the rim of a sparse area are material that no one asked for: up to 10 mm they cost
+/// less than the travel and the retraction that they save.
+const SPARSE_JOINS: JoinParams = JoinParams { longest: 10.0, fill_rim: false };
 
 /// What fills the solid and sparse areas of an island.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -149,17 +153,10 @@ fn solid(
     let area = Region::from_island(island.clone());
     match params.solid_pattern {
         Pattern::Rectilinear | Pattern::Grid => {
-            let angle = angle_in(layer, params);
-            // The lines are spread so that a whole number of them fills the island.
-            let even = rectilinear::even_spacing(&area, bead.spacing(), angle);
-            let bead = Bead::with_spacing(even, layer.thickness);
-            let core = area.inset(even / 2.0);
-            let chords: Vec<Chord> = core
-                .islands()
-                .iter()
-                .flat_map(|island| rectilinear::evenly_spread(&core, island, even, angle))
-                .collect();
-            filling.lines.extend(open_lines(&core, &chords, f64::INFINITY, role, bead, layer));
+            let even = rectilinear::evenly(&area, bead.spacing(), angle_in(layer, params));
+            let bead = Bead::with_spacing(even.spacing, layer.thickness);
+            let (core, chords) = (&even.core, &even.chords);
+            filling.lines.extend(open_lines(core, chords, &SOLID_JOINS, role, bead, layer));
         }
         Pattern::Concentric => {
             let (loops, thin) = concentric::solid(&area, bead.spacing());
@@ -172,7 +169,7 @@ fn solid(
             let phase = if layer.index.is_multiple_of(2) { 0.0 } else { std::f64::consts::PI };
             let turning = turning(layer.index);
             let chords = spiral::chords(&core, bead.spacing(), phase, turning, layer.tolerance);
-            filling.lines.extend(open_lines(&core, &chords, f64::INFINITY, role, bead, layer));
+            filling.lines.extend(open_lines(&core, &chords, &SOLID_JOINS, role, bead, layer));
         }
     }
 }
@@ -186,10 +183,9 @@ fn sparse(area: &Region, layer: &FillLayer, params: &InfillParams) -> Vec<FillLi
     let bead = Bead { width: params.width, thickness: layer.thickness };
     let spacing = bead.spacing() / params.density;
     let core = area.inset(bead.spacing() / 2.0);
-    let join = LONGEST_SPARSE_JOIN_MM;
     let parallel = |spacing: f64, angle: f64| {
         let chords = rectilinear::about_axis(&core, spacing, angle);
-        open_lines(&core, &chords, join, role, bead, layer)
+        open_lines(&core, &chords, &SPARSE_JOINS, role, bead, layer)
     };
     match params.pattern {
         Pattern::Rectilinear => parallel(spacing, angle_in(layer, params)),
@@ -206,7 +202,7 @@ fn sparse(area: &Region, layer: &FillLayer, params: &InfillParams) -> Vec<FillLi
             // Sparse lines must stand on those of the layer below: neither phase nor sense changes.
             let turning = Turning::CounterClockwise;
             let chords = spiral::chords(&core, spacing, 0.0, turning, layer.tolerance);
-            open_lines(&core, &chords, join, role, bead, layer)
+            open_lines(&core, &chords, &SPARSE_JOINS, role, bead, layer)
         }
     }
 }
@@ -214,12 +210,12 @@ fn sparse(area: &Region, layer: &FillLayer, params: &InfillParams) -> Vec<FillLi
 fn open_lines(
     core: &Region,
     chords: &[Chord],
-    longest_join: f64,
+    joins: &JoinParams,
     role: Role,
     bead: Bead,
     layer: &FillLayer,
 ) -> Vec<FillLine> {
-    link::joined(core, chords, longest_join)
+    link::joined(core, chords, joins)
         .into_iter()
         .map(|points| simplify_line(&points, layer.tolerance))
         .filter(|points| geom::polyline::length(points) >= LEAST_LENGTH_IN_WIDTHS * bead.width)
@@ -310,7 +306,7 @@ mod tests {
                     // Turns of a spiral end where the area does, whatever the pitch; in a narrow
                     // strip that is a good part of it.
                     let slack = match pattern {
-                        Pattern::Rectilinear | Pattern::Grid => 0.008,
+                        Pattern::Rectilinear | Pattern::Grid => 0.01,
                         Pattern::Concentric => 0.02,
                         Pattern::Archimedean if k == 3 => 0.1,
                         Pattern::Archimedean => 0.03,
@@ -328,7 +324,9 @@ mod tests {
             for (index, area) in areas().iter().enumerate() {
                 let skins = Skins { solid: area.clone(), ..Skins::default() };
                 let ratio = laid(&fill(&skins, &LAYER, &params)) / area.area();
-                assert!((ratio - 1.0).abs() < 0.02, "angle {k}, area {index}: {ratio}");
+                // The ends of a line lack half a spacing each, which shows in a narrow strip.
+                let slack = if index == 3 { 0.025 } else { 0.006 };
+                assert!((ratio - 1.0).abs() < slack, "angle {k}, area {index}: {ratio}");
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Parallel lines.
 
 use geom::grid::mm;
-use geom::region::{Island, Region};
+use geom::region::Region;
 use nalgebra::{Point2, Rotation2};
 
 use super::{Chord, RimPoint};
@@ -14,53 +14,58 @@ const OFF_RIM_MM: f64 = 1e-3;
 /// two of them, so that no line grazes it and lines of all layers stand on each other.
 pub(super) fn about_axis(core: &Region, spacing: f64, angle: f64) -> Vec<Chord> {
     let rows = Rows { first: spacing / 2.0, spacing, count: None };
-    let rings: Vec<usize> = (0..core.rings().count()).collect();
-    chords(core, &rings, &rows, angle)
+    chords(core, &rows, angle)
 }
 
-/// Returns the spacing near `wanted` of which a whole number fills `area` across the lines.
-pub(super) fn even_spacing(area: &Region, wanted: f64, angle: f64) -> f64 {
-    let (low, high) = extent(area.rings(), angle);
-    let across = high - low;
-    if across <= 0.0 { wanted } else { across / (across / wanted).round().max(1.0) }
+/// Lines that fill an area evenly.
+pub(super) struct Even {
+    /// Where they run: half a spacing inside the area.
+    pub(super) core: Region,
+    /// The lines.
+    pub(super) chords: Vec<Chord>,
+    /// Their distance, mm.
+    pub(super) spacing: f64,
 }
 
-/// Returns lines in one island of `core`, the first and last of them along its far sides.
-pub(super) fn evenly_spread(
-    core: &Region,
-    island: &Island,
-    spacing: f64,
-    angle: f64,
-) -> Vec<Chord> {
-    let (low, high) = extent(island.iter(), angle);
+/// Returns lines about `wanted` mm apart, spread so that the first and the last run along the far
+/// sides of the area, which should be a single island.
+pub(super) fn evenly(area: &Region, wanted: f64, angle: f64) -> Even {
+    // How far apart the outermost lines are when there are `gaps` between them depends on how far
+    // inside they run, and so on the spacing itself; that the extent shrinks evenly settles it.
+    let whole = across(area, angle);
+    let within = across(&area.inset(wanted / 2.0), angle);
+    let shrinking = (whole - within) / wanted;
+    let gaps = (within / wanted).round();
+    let spacing = if gaps < 1.0 {
+        whole.clamp(wanted * NARROWEST, wanted * WIDEST)
+    } else {
+        whole / (gaps + shrinking)
+    };
+    let core = area.inset(spacing / 2.0);
+    let (low, high) = extent(&core, angle);
     let (low, high) = (low + OFF_RIM_MM, high - OFF_RIM_MM);
-    if high <= low {
-        return Vec::new();
-    }
-    let gaps = ((high - low) / spacing).round();
     let rows = if gaps < 1.0 {
         Rows { first: f64::midpoint(low, high), spacing, count: Some(1) }
     } else {
         Rows { first: low, spacing: (high - low) / gaps, count: Some(gaps as i64 + 1) }
     };
-    let own: Vec<usize> = core
-        .islands()
-        .iter()
-        .scan(0, |next, other| {
-            let rings = *next..*next + other.len();
-            *next = rings.end;
-            Some((rings, std::ptr::eq(other, island)))
-        })
-        .filter(|(_, is_own)| *is_own)
-        .flat_map(|(rings, _)| rings)
-        .collect();
-    chords(core, &own, &rows, angle)
+    let chords = chords(&core, &rows, angle);
+    Even { core, chords, spacing: rows.spacing }
+}
+
+/// The narrowest and the widest that a line alone in its area may be, as shares of its spacing.
+const NARROWEST: f64 = 0.7;
+const WIDEST: f64 = 1.5;
+
+fn across(region: &Region, angle: f64) -> f64 {
+    let (low, high) = extent(region, angle);
+    (high - low).max(0.0)
 }
 
 /// The least and greatest coordinate across the lines.
-fn extent<'a>(rings: impl Iterator<Item = &'a geom::region::Ring>, angle: f64) -> (f64, f64) {
+fn extent(region: &Region, angle: f64) -> (f64, f64) {
     let (sin, cos) = angle.sin_cos();
-    rings.flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &p| {
+    region.rings().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &p| {
         let p = mm(p);
         let v = -sin * p.x + cos * p.y;
         (low.min(v), high.max(v))
@@ -94,12 +99,11 @@ struct Crossing {
     rim: RimPoint,
 }
 
-fn chords(core: &Region, ring_indices: &[usize], rows: &Rows, angle: f64) -> Vec<Chord> {
+fn chords(core: &Region, rows: &Rows, angle: f64) -> Vec<Chord> {
     let to_rows = Rotation2::new(-angle);
-    let rings: Vec<&geom::region::Ring> = core.rings().collect();
     let mut crossings = Vec::new();
-    for &ring in ring_indices {
-        let points: Vec<Point2<f64>> = rings[ring].iter().map(|&p| to_rows * mm(p)).collect();
+    for (ring, points) in core.rings().enumerate() {
+        let points: Vec<Point2<f64>> = points.iter().map(|&p| to_rows * mm(p)).collect();
         for side in 0..points.len() {
             let (a, b) = (points[side], points[(side + 1) % points.len()]);
             for row in rows.between(a.y.min(b.y), a.y.max(b.y)) {
