@@ -147,9 +147,19 @@ fn begun_at(path: &Toolpath, start: usize) -> OrderedLine {
     OrderedLine { role: path.role, stations, island: None }
 }
 
+/// A begin on a side nearer than this to a corner moves into the corner, mm: shorter pieces strain
+/// firmwares and show nothing.
+const SHORTEST_PIECE_MM: f64 = 0.03;
+
 /// A closed line begun at the place on it nearest to `target`, on a side if need be.
 fn begun_near(path: &Toolpath, target: &Point2<f64>) -> OrderedLine {
-    let place = nearest_on_ring(&plane(path), target).expect("lines have points");
+    let points = plane(path);
+    let place = nearest_on_ring(&points, target).expect("lines have points");
+    for corner in [place.side, (place.side + 1) % points.len()] {
+        if distance(&points[corner], &place.at) < SHORTEST_PIECE_MM {
+            return begun_at(path, corner);
+        }
+    }
     let (from, to) =
         (path.stations[place.side], path.stations[(place.side + 1) % path.stations.len()]);
     let blend = |a: f64, b: f64| a + (b - a) * place.share;

@@ -1,5 +1,6 @@
 //! The planner: one layer after the other becomes steps of the program.
 
+use machine::gcode::dialect::Space;
 use machine::kinematics::Unreachable;
 use machine::profile::Printer;
 use machine::program::{Joints, Move, Role, Step};
@@ -103,7 +104,7 @@ impl<'a> Planner<'a> {
         Self {
             printer,
             params,
-            limits: Limits::of(printer, !params.resample.straight_over_part),
+            limits: Limits::of(printer, params.resample.dialect.space == Space::Joints),
             router: Router::new(resampler.at(), printer.lift.speed),
             resampler,
             seams: SeamMemory::default(),

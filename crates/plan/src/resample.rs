@@ -6,11 +6,16 @@
 //! most 60° in one move (the rule of the calibration's derivation; any alignment is covered, at the
 //! price of up to 1.8 times the least possible number of moves).
 //!
+//! Positions are rounded here as the text will round them, so that lengths, speeds and
+//! accelerations are planned for the very moves that a reader of the program sees.
+//!
 //! Ways that would come too near to the axis are bent round it ([`axis`](crate::axis)). Where the
 //! carriage can pass the centre, a stroke that runs through the axis to within the chord tolerance
 //! is one move to the other side of the rail, and the bed does not turn at all; what follows is
 //! then laid from the far side, as far as the rail reaches.
 
+use machine::gcode::Dialect;
+use machine::gcode::dialect::Space;
 use machine::kinematics::{Alignment, Branch, Unreachable};
 use machine::profile::Printer;
 use machine::program::{BedTurn, Joints};
@@ -26,9 +31,11 @@ pub struct ResampleParams {
     pub chord: f64,
     /// The same for travel, mm.
     pub travel_chord: f64,
-    /// Whether moves are straight over the part instead of in joint space.
-    pub straight_over_part: bool,
-    /// Angle by which the slicer's frame is turned on the bed, radians.
+    /// The words of the program: in which coordinates moves are straight, and how positions are
+    /// rounded.
+    pub dialect: Dialect,
+    /// Angle by which the slicer's frame is turned on the bed, radians. A whole number of the last
+    /// decimal place of an angle in the text makes programs of turned parts equal but for it.
     pub azimuth: f64,
 }
 
@@ -52,10 +59,10 @@ pub struct Leg {
 /// Largest turn of the bed in one move, radians: 60°.
 const LARGEST_TURN: f64 = std::f64::consts::FRAC_PI_3;
 
-/// Turn of the bed in one move round the axis, radians: 15°. Small enough that chord and arc, by
-/// which readers of a program measure speed, differ by less than a third of a percent, and that
-/// the bed can be sped up and braked in steps.
-const ARC_STEP: f64 = 0.262;
+/// Turn of the bed in one move round the axis, radians: 30°. Small enough that chord and arc, by
+/// which readers of a program measure speed, differ by only 1 %, and that the bed can be sped up
+/// and braked in steps; large enough that few moves are tiny.
+const ARC_STEP: f64 = std::f64::consts::FRAC_PI_6;
 
 /// Halvings after which a piece is taken as it is; 2⁻⁴⁰ of any stroke is far below a step.
 const MOST_HALVINGS: u32 = 40;
@@ -72,6 +79,8 @@ pub struct Resampler {
     branch: Branch,
     /// Where the nozzle stands over the bed; not always where the last stroke ended.
     over_bed: Point2<f64>,
+    /// Where it stands in the part, as the text says it.
+    at_part: Point3<f64>,
 }
 
 /// Where the nozzle is to be, over the bed.
@@ -94,6 +103,7 @@ impl Resampler {
             joints: printer.home,
             branch: Branch::Near,
             over_bed: Point2::from(printer.alignment.over_bed(&at.xy())),
+            at_part: at,
         }
     }
 
@@ -106,8 +116,7 @@ impl Resampler {
     /// Returns where the nozzle stands, in the slicer's frame.
     #[must_use]
     pub fn at(&self) -> Point3<f64> {
-        let part = self.alignment.part_from_joints(&self.joints);
-        Rotation2d(-self.params.azimuth).turn(&part)
+        Rotation2d(-self.params.azimuth).turn(&self.at_part)
     }
 
     /// Returns the legs of consecutive strokes.
@@ -124,7 +133,7 @@ impl Resampler {
                 z: stroke.to.z,
             };
             let mut legs = Vec::new();
-            if self.params.straight_over_part {
+            if self.params.dialect.space == Space::Part {
                 self.straight(stroke, at, &mut legs);
             } else if stroke.kind == Kind::Filament || target.over_bed == self.over_bed {
                 self.standing(stroke, target.z, &mut legs);
@@ -138,19 +147,21 @@ impl Resampler {
 
     /// A stroke in a dialect whose moves are straight over the part.
     fn straight(&mut self, stroke: &Stroke, at: Point3<f64>, legs: &mut Vec<Leg>) {
-        let here = self.alignment.part_from_joints(&self.joints);
+        let at = self.params.dialect.rounded_point(&at);
+        let here = self.at_part;
         // Joints are a courtesy here; where the rail cannot follow, they stay.
         self.joints = self
             .alignment
             .joints_from_part(&at, Branch::Near, self.joints.turn)
             .unwrap_or(Joints { z: at.z, ..self.joints });
-        let from = if stroke.kind == Kind::Filament { at } else { here };
+        let path = if stroke.kind == Kind::Filament { 0.0 } else { (at - here).norm() };
+        self.at_part = at;
         legs.push(Leg {
             kind: stroke.kind,
             to: self.joints,
             at,
             filament: stroke.filament,
-            path: (at - from).norm(),
+            path,
             speed: stroke.speed,
         });
     }
@@ -314,6 +325,7 @@ impl Resampler {
     }
 
     fn push(&mut self, kind: Kind, to: Joints, target: &Target, legs: &mut Vec<Leg>) {
+        let to = self.params.dialect.rounded_joints(&to);
         let path = self.path_length(&to);
         if path == 0.0 {
             return;
@@ -321,6 +333,7 @@ impl Resampler {
         self.joints = to;
         self.over_bed = target.over_bed;
         let at = self.alignment.part_from_joints(&to);
+        self.at_part = at;
         legs.push(Leg { kind, to, at, filament: 0.0, path, speed: 0.0 });
     }
 
@@ -418,10 +431,11 @@ fn between(a: &Joints, b: &Joints, share: f64) -> Joints {
 mod tests {
     use super::*;
     use crate::testing::printer;
+    use machine::gcode::dialect::{CARTESIAN, POLAR};
     use std::f64::consts::PI;
 
     const PARAMS: ResampleParams =
-        ResampleParams { chord: 0.005, travel_chord: 0.1, straight_over_part: false, azimuth: 0.0 };
+        ResampleParams { chord: 0.005, travel_chord: 0.1, dialect: POLAR, azimuth: 0.0 };
 
     fn print(x: f64, y: f64) -> Stroke {
         Stroke { kind: Kind::Print, to: Point3::new(x, y, 0.2), filament: 0.1, speed: 50.0 }
@@ -526,21 +540,23 @@ mod tests {
     fn the_azimuth_turns_the_bed_and_nothing_else() {
         let strokes = [travel(12.0, 3.0), print(-9.0, 7.0), print(-9.0, -20.0)];
         let mut plain = Resampler::new(&printer(), PARAMS);
-        let mut turned = Resampler::new(&printer(), ResampleParams { azimuth: 0.8, ..PARAMS });
+        // A whole number of the last place of an angle, so that rounding turns along.
+        let azimuth = 45.8366_f64.to_radians();
+        let mut turned = Resampler::new(&printer(), ResampleParams { azimuth, ..PARAMS });
         let (plain, turned) = (legs(&mut plain, &strokes), legs(&mut turned, &strokes));
         // The first stroke comes from home, which does not turn with the part.
         let first = plain.iter().position(|leg| leg.kind == Kind::Print).unwrap();
         let offset = turned.len() - plain.len();
         for (a, b) in plain[first..].iter().zip(&turned[first + offset..]) {
             assert!((a.to.s - b.to.s).abs() < 1e-9);
-            let turn = b.to.turn.radians() - a.to.turn.radians() - 0.8;
+            let turn = b.to.turn.radians() - a.to.turn.radians() - azimuth;
             assert!(turn.abs() < 1e-9, "{turn}");
         }
     }
 
     #[test]
     fn straight_dialects_get_one_leg_a_stroke() {
-        let params = ResampleParams { straight_over_part: true, ..PARAMS };
+        let params = ResampleParams { dialect: CARTESIAN, ..PARAMS };
         let mut resampler = Resampler::new(&printer(), params);
         let all = resampler.legs(&[travel(-40.0, 1.0), print(40.0, 1.0)]).unwrap();
         assert_eq!((all[0].len(), all[1].len()), (1, 1));

@@ -32,8 +32,8 @@ struct AxisLimit {
     acceleration: f64,
 }
 
-/// Share of a limit that is used. The text of a program rounds positions to 1 µm and 0.0001°, which
-/// on a short move is a fraction of a percent of its speed.
+/// Share of a limit that is used. Positions are rounded before they come here; what is left is the
+/// rounding of `F`, and readers who measure an arc by its chord.
 const USED_SHARE: f64 = 0.99;
 
 /// Times that durations are gone over before the rest is left as it is. Each pass brings a change of
@@ -140,6 +140,7 @@ fn keep_accelerations(durations: &mut [f64], travels: &[Travel], before: Pace, l
         for i in 1..durations.len() {
             changed |= agree(i - 1, durations, travels, limits);
         }
+        changed |= come_to_rest(durations, travels, limits);
         for i in (1..durations.len()).rev() {
             changed |= agree(i - 1, durations, travels, limits);
         }
@@ -172,6 +173,20 @@ fn join_on(before: Pace, durations: &mut [f64], travels: &[Travel], limits: &Lim
         }
         changed = true;
     }
+    changed
+}
+
+/// Makes the last move slow enough to be followed by anything: what comes next, often a retraction
+/// that should be fast, can then keep its speed.
+fn come_to_rest(durations: &mut [f64], travels: &[Travel], limits: &Limits) -> bool {
+    let (Some(duration), Some(travel)) = (durations.last_mut(), travels.last()) else {
+        return false;
+    };
+    let needed = (0..2)
+        .map(|k| slowed(travel.axes[k], 0.0, 0.0, limits.axes[k].acceleration))
+        .fold(0.0, f64::max);
+    let changed = needed > *duration * (1.0 + SLACK);
+    *duration = duration.max(needed);
     changed
 }
 
@@ -226,7 +241,7 @@ mod tests {
         let params = ResampleParams {
             chord: 0.005,
             travel_chord: 0.1,
-            straight_over_part: false,
+            dialect: machine::gcode::dialect::POLAR,
             azimuth: 0.0,
         };
         let mut resampler = Resampler::new(&printer, params);

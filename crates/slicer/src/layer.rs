@@ -38,6 +38,8 @@ pub struct Filled {
     pub paths: LayerPaths,
     /// Loops of skirt and brim that the reach of the machine left out.
     pub adhesion_out_of_reach: usize,
+    /// Area of the islands that begin in mid-air, mm².
+    pub floating_area: f64,
 }
 
 /// Fills the material of one layer.
@@ -62,8 +64,13 @@ pub fn fill_layer(
             thickness: level.thickness(),
             ..LayerPaths::default()
         },
-        adhesion_out_of_reach: 0,
+        ..Filled::default()
     };
+    if level.index > 0 {
+        let below = neighbours.below.first();
+        let floats = |island: &&Island| below.is_none_or(|below| !rests_on(island, below));
+        filled.floating_area = material.filtered(floats).area();
+    }
     for (paths, lost) in islands {
         filled.paths.lost.merge(&lost);
         filled.paths.islands.push(paths);
@@ -79,6 +86,13 @@ pub fn fill_layer(
             .collect();
     }
     filled
+}
+
+/// Whether an island has anything below it.
+fn rests_on(island: &Island, below: &Region) -> bool {
+    // Nearly always the first corner decides.
+    island.iter().flatten().any(|&p| below.contains(&geom::grid::mm(p)))
+        || !Region::from_island(island.clone()).intersection(below).is_empty()
 }
 
 fn fill_island(

@@ -1,1 +1,27 @@
-//! twin
+//! The independent witness: reads the emitted text again and proves it on a model of the machine.
+//!
+//! Nothing here knows how a program was made. What is judged is the text, with the printer's
+//! profile and the mesh in the frame of the part as the only other evidence.
+//!
+//! In reading order: [`curve`] is the path of the nozzle over the part during one move, as
+//! forward kinematics gives it; [`segment`] is one move with all that is known of it; [`replay`]
+//! makes segments out of lines; [`rounding`] says how far the last places of the text can bend
+//! what is measured; [`section`] cuts the mesh. The checks, one concept each, are in [`check`],
+//! what they find in [`finding`], the sums of a program in [`totals`]; [`verify`] runs it all over
+//! a program. [`picture`] draws what was replayed, so that a picture cannot lie.
+//!
+//! Lengths are mm, angles radians, times seconds, temperatures degrees Celsius. Frames: *Part*
+//! turns with the bed, *Machine* does not; both as in [`machine::kinematics`].
+
+pub mod check;
+pub mod curve;
+pub mod finding;
+pub mod picture;
+pub mod replay;
+pub mod rounding;
+#[cfg(test)]
+mod sample;
+pub mod section;
+pub mod segment;
+pub mod totals;
+pub mod verify;

@@ -6,6 +6,7 @@
 
 use nalgebra::Point3;
 
+use super::number::{quantum, value};
 use crate::program::{BedTurn, Joints, Move};
 
 /// In which coordinates a move between two lines of the program is straight.
@@ -104,19 +105,44 @@ impl Dialect {
         }
     }
 
-    /// Decimal places of the plane's words at the end of a move: near the axis a thousandth of a
-    /// millimetre is a coarse angle.
-    pub(super) fn decimals(&self, step: &Move) -> [usize; 2] {
-        let near_axis = match self.space {
-            Space::Joints => step.to.s.abs() < NEAR_AXIS_MM,
-            Space::Part => step.at.xy().coords.norm() < NEAR_AXIS_MM,
-        };
-        self.plane.map(|word| match word.quantity {
-            Quantity::Bed => DEGREE_DECIMALS,
-            _ if near_axis => NEAR_AXIS_DECIMALS,
-            _ => MM_DECIMALS,
-        })
+    /// Returns joints as a program in this dialect's words will say them.
+    #[must_use]
+    pub fn rounded_joints(&self, to: &Joints) -> Joints {
+        let lengths = self.length_decimals(to.s.abs());
+        let degrees = rounded(to.turn.radians().to_degrees(), DEGREE_DECIMALS);
+        Joints {
+            s: rounded(to.s, lengths),
+            turn: BedTurn::accumulated(degrees.to_radians()),
+            z: rounded(to.z, MM_DECIMALS),
+        }
     }
+
+    /// Returns a point of the part as a program in this dialect's words will say it.
+    #[must_use]
+    pub fn rounded_point(&self, at: &Point3<f64>) -> Point3<f64> {
+        let lengths = self.length_decimals(at.xy().coords.norm());
+        Point3::new(rounded(at.x, lengths), rounded(at.y, lengths), rounded(at.z, MM_DECIMALS))
+    }
+
+    /// Decimal places of the plane's words at the end of a move.
+    pub(super) fn decimals(&self, step: &Move) -> [usize; 2] {
+        let lengths = self.length_decimals(match self.space {
+            Space::Joints => step.to.s.abs(),
+            Space::Part => step.at.xy().coords.norm(),
+        });
+        self.plane
+            .map(|word| if word.quantity == Quantity::Bed { DEGREE_DECIMALS } else { lengths })
+    }
+
+    /// Decimal places of lengths at this distance from the axis: near it a thousandth of a
+    /// millimetre is a coarse angle.
+    fn length_decimals(&self, from_axis: f64) -> usize {
+        if from_axis < NEAR_AXIS_MM { NEAR_AXIS_DECIMALS } else { MM_DECIMALS }
+    }
+}
+
+fn rounded(number: f64, decimals: usize) -> f64 {
+    value(quantum(number, decimals), decimals)
 }
 
 /// Decimal places of lengths: 1 µm.

@@ -133,8 +133,9 @@ impl<W: Write> Emitter<W> {
             self.line.extend_from_slice(b" E");
             push_quantum(&mut self.line, filament, FILAMENT_DECIMALS);
         }
-        // Rounded down, so that a limit stays a limit; never to nothing.
-        let feed = (motion.feed().word() * 10.0).floor().max(1.0) as i64;
+        // Rounded down, so that a limit stays a limit; never to nothing. What is a whole number but
+        // for its last bits stays one.
+        let feed = (motion.feed().word() * 10.0 + 1e-3).floor().max(1.0) as i64;
         if feed != self.feed {
             self.line.extend_from_slice(b" F");
             push_quantum(&mut self.line, feed, FEED_DECIMALS);

@@ -247,8 +247,14 @@ fn free_end_share<'a>(
         }
     }
     let share = ((ahead + behind) / 4.0).min(f64::max(ahead, behind) / 2.0);
+    if share < LEAST_SHARE_MM {
+        return Vec::new();
+    }
     along_rim(ring, rim, share, ahead > behind)
 }
+
+/// Pieces of rim shorter than this are not worth a move, mm.
+const LEAST_SHARE_MM: f64 = 0.05;
 
 /// The points of a ring from a place on it, `length` mm forwards or backwards.
 fn along_rim(

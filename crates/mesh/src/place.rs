@@ -1,0 +1,150 @@
+//! Where a part stands on the bed, and a direction that turns with it.
+//!
+//! A part stands on z = 0 with the centre of its footprint on the axis of the bed. The footprint
+//! is the smallest circle around the part seen from above: unlike a bounding box, it turns with
+//! the part, so a part that is turned about z is placed the same way, but turned.
+
+mod azimuth;
+
+pub use azimuth::reference_azimuth;
+
+use crate::mesh::Mesh;
+use crate::topology::Solid;
+use geom::circle::{Circle, smallest_around};
+use nalgebra::{Isometry3, Point2, Point3, Rotation3, Vector3};
+
+/// How a part gets from the Model frame to the Part frame: turned, then shifted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    /// The turn.
+    pub rotation: Rotation3<f64>,
+    /// The shift after it, mm.
+    pub shift: Vector3<f64>,
+}
+
+impl Placement {
+    /// Returns the placement that sets a mesh, turned by `rotation`, on the bed and on the axis.
+    #[must_use]
+    pub fn on_bed(mesh: &Mesh, rotation: &Rotation3<f64>) -> Self {
+        let turned = Self { rotation: *rotation, shift: Vector3::zeros() }.mesh(mesh);
+        let shift = match footprint(&turned) {
+            None => Vector3::zeros(),
+            Some(circle) => {
+                Vector3::new(-circle.centre.x, -circle.centre.y, -turned.bounds().min.z)
+            }
+        };
+        Self { rotation: *rotation, shift }
+    }
+
+    /// Returns the position of a point after the placement.
+    ///
+    /// The rotation is applied as a matrix: quarter turns are exact, so flat faces stay exactly
+    /// flat.
+    #[must_use]
+    pub fn point(&self, p: &Point3<f64>) -> Point3<f64> {
+        self.rotation * p + self.shift
+    }
+
+    /// Returns a mesh after the placement.
+    #[must_use]
+    pub fn mesh(&self, mesh: &Mesh) -> Mesh {
+        let vertices = mesh.vertices.iter().map(|p| self.point(p)).collect();
+        Mesh { vertices, triangles: mesh.triangles.clone() }
+    }
+
+    /// Returns the transform `part_from_model`.
+    #[must_use]
+    pub fn isometry(&self) -> Isometry3<f64> {
+        Isometry3::from_parts(self.shift.into(), self.rotation.into())
+    }
+}
+
+/// Sets a solid, turned by `rotation`, on the bed and on the axis.
+#[must_use]
+pub fn placed(solid: &Solid, rotation: &Rotation3<f64>) -> (Solid, Placement) {
+    let placement = Placement::on_bed(solid.mesh(), rotation);
+    (solid.moved(|p| placement.point(p)), placement)
+}
+
+/// Returns the smallest circle around a mesh seen from above; `None` when it has no vertices.
+#[must_use]
+pub fn footprint(mesh: &Mesh) -> Option<Circle> {
+    smallest_around(&outermost(mesh))
+}
+
+/// The vertices seen from above, without those that are surely inside their hull: a hull needs a
+/// sort of its points, and most points of a mesh are inside.
+fn outermost(mesh: &Mesh) -> Vec<Point2<f64>> {
+    let points = || mesh.vertices.iter().map(|p| p.xy());
+    const N_DIRECTIONS: usize = 16;
+    let directions: Vec<[f64; 2]> = (0..N_DIRECTIONS)
+        .map(|i| (i as f64 / N_DIRECTIONS as f64 * std::f64::consts::TAU).sin_cos())
+        .map(|(sin, cos)| [cos, sin])
+        .collect();
+    let mut far = vec![(f64::NEG_INFINITY, Point2::origin()); N_DIRECTIONS];
+    for p in points() {
+        for (far, [x, y]) in far.iter_mut().zip(&directions) {
+            let reach = p.x * x + p.y * y;
+            if reach > far.0 {
+                *far = (reach, p);
+            }
+        }
+    }
+    // The points that reach farthest are corners of the hull; a circle within them is inside it.
+    let corners: Vec<Point2<f64>> = far.iter().map(|(_, p)| *p).collect();
+    let mean = corners.iter().map(|p| p.coords).sum::<nalgebra::Vector2<f64>>();
+    let centre = Point2::from(mean / N_DIRECTIONS as f64);
+    let apart = |i: usize| {
+        let (a, b) = (corners[i], corners[(i + 1) % N_DIRECTIONS]);
+        let side = b - a;
+        if side.norm() == 0.0 { f64::INFINITY } else { side.perp(&(centre - a)) / side.norm() }
+    };
+    let inside = (0..N_DIRECTIONS).map(apart).fold(f64::INFINITY, f64::min);
+    points().filter(|p| nalgebra::distance(p, &centre) >= inside).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shapes;
+
+    #[test]
+    fn parts_stand_on_the_bed_and_on_the_axis() {
+        let mut mesh = shapes::steps();
+        mesh.vertices.iter_mut().for_each(|p| *p += Vector3::new(31.0, -7.0, 100.0));
+        let solid = Solid::new(mesh);
+        for angle in [0.0, 0.5, 2.0] {
+            let rotation = Rotation3::from_euler_angles(angle, 0.2, 0.1);
+            let (placed, placement) = placed(&solid, &rotation);
+            assert_eq!(placed.mesh().bounds().min.z, 0.0);
+            let circle = footprint(placed.mesh()).unwrap();
+            assert!(circle.centre.coords.norm() < 1e-9);
+            assert_eq!(placed.sides(), solid.sides());
+            let moved = placement.isometry() * solid.mesh().vertices[3];
+            assert!((moved - placed.mesh().vertices[3]).norm() < 1e-9);
+            let volume: f64 = placed.shells().iter().map(|s| s.volume_mm3).sum();
+            assert!((volume - 10_742.4).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn quarter_turns_are_exact() {
+        let to_bed = crate::orient::down_to_bed(&Vector3::x());
+        let placed = Placement::on_bed(&shapes::cube(20.0), &to_bed);
+        let mesh = placed.mesh(&shapes::cube(20.0));
+        assert!(mesh.vertices.iter().all(|p| p.z == 0.0 || p.z == 20.0));
+    }
+
+    #[test]
+    fn the_filter_keeps_the_footprint() {
+        for name in shapes::NAMES {
+            let mesh = shapes::by_name(name).unwrap();
+            let all: Vec<Point2<f64>> = mesh.vertices.iter().map(|p| p.xy()).collect();
+            let (a, b) = (smallest_around(&all).unwrap(), footprint(&mesh).unwrap());
+            assert!((a.centre - b.centre).norm() < 1e-9, "{name}");
+            assert!((a.radius - b.radius).abs() < 1e-9, "{name}");
+        }
+        assert!(outermost(&shapes::icosphere(4, 10.0)).len() < 1000);
+        assert_eq!(footprint(&Mesh::default()), None);
+    }
+}

@@ -1,0 +1,295 @@
+//! What can be typed.
+
+use std::path::PathBuf;
+
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+
+use crate::settings::Sources;
+
+/// A curved-layer slicer for polar 3-D printers.
+#[derive(Debug, Parser)]
+#[command(name = "rhumb", version, about, propagate_version = true, max_term_width = 100)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+    /// How to speak.
+    #[command(flatten)]
+    pub manner: Manner,
+}
+
+/// How rhumb speaks, for every command.
+#[derive(Debug, Clone, Args)]
+pub struct Manner {
+    /// Print results as one JSON object on standard output
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Say nothing but results and errors
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// Say more
+    #[arg(short, long, global = true)]
+    pub verbose: bool,
+    /// Number of threads; all processors by default
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Colour the output
+    #[arg(long, global = true, value_enum, default_value_t = Color::Auto)]
+    pub color: Color,
+    /// How to print errors
+    #[arg(long, global = true, value_enum, default_value_t = ErrorFormat::Text)]
+    pub error_format: ErrorFormat,
+}
+
+/// When to colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Color {
+    /// On a terminal.
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+/// How to print errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ErrorFormat {
+    /// For people.
+    Text,
+    /// For programs.
+    Json,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Turn a model into a program for the printer
+    Slice(Box<Slice>),
+    /// Say what is in a mesh and what a repair would do
+    Inspect(Inspect),
+    /// List the ways to lay a model down, and write it turned
+    Orient(Orient),
+    /// Read a program again and prove it on a model of the machine
+    Verify(Verify),
+    /// Draw a program
+    Preview(Preview),
+    /// List, show and check settings
+    #[command(subcommand)]
+    Profile(Profile),
+    /// Write a built-in model
+    #[command(hide = true)]
+    Model(Model),
+}
+
+/// Which settings to use.
+#[derive(Debug, Clone, Args)]
+pub struct SettingsArguments {
+    /// Printer settings: a built-in name or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub printer: Option<String>,
+    /// Material settings: a built-in name or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub material: Option<String>,
+    /// Print settings: a built-in name or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub print: Option<String>,
+    /// Set one value; wins over all files (repeatable)
+    #[arg(long, value_name = "KEY=VALUE", action = ArgAction::Append)]
+    pub set: Vec<String>,
+    /// The words of the program: polar or cartesian
+    #[arg(long, value_name = "NAME")]
+    pub dialect: Option<String>,
+}
+
+impl SettingsArguments {
+    /// Returns the sources that these options name.
+    #[must_use]
+    pub fn sources(&self) -> Sources {
+        let mut set = self.set.clone();
+        if let Some(dialect) = &self.dialect {
+            set.push(format!("dialect={dialect}"));
+        }
+        Sources {
+            printer: self.printer.clone(),
+            material: self.material.clone(),
+            print: self.print.clone(),
+            set,
+        }
+    }
+}
+
+/// How the model is placed.
+#[derive(Debug, Clone, Args)]
+pub struct PlaceArguments {
+    /// How to lay the model down: flat (on its largest flat face), keep, or turns about x, y and z
+    /// in degrees
+    #[arg(
+        long,
+        value_name = "flat|keep|RX,RY,RZ",
+        default_value = "flat",
+        allow_hyphen_values = true
+    )]
+    pub orient: String,
+    /// Where the part's footprint is centred, mm from the rotation axis
+    #[arg(long, value_name = "X,Y", default_value = "0,0", allow_hyphen_values = true)]
+    pub place: String,
+    /// Scale the model
+    #[arg(long, value_name = "S", default_value_t = 1.0)]
+    pub scale: f64,
+    /// What a unit of the file is
+    #[arg(long, value_enum, default_value_t = Units::Mm)]
+    pub units: Units,
+}
+
+/// Units of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Units {
+    /// Millimetres.
+    Mm,
+    /// Inches.
+    Inch,
+    /// Metres.
+    M,
+}
+
+impl Units {
+    /// Millimetres in a unit.
+    #[must_use]
+    pub fn mm(self) -> f64 {
+        match self {
+            Self::Mm => 1.0,
+            Self::Inch => 25.4,
+            Self::M => 1000.0,
+        }
+    }
+}
+
+/// The layer surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LayerKind {
+    /// Horizontal planes.
+    Planar,
+}
+
+/// Arguments of `slice`.
+#[derive(Debug, Args)]
+pub struct Slice {
+    /// The model, binary or ASCII STL; `-` reads standard input
+    pub model: PathBuf,
+    /// Where the program goes; `-` writes standard output [default: MODEL.gcode]
+    #[arg(short, long, value_name = "OUT.gcode")]
+    pub output: Option<PathBuf>,
+    /// The surface that layers follow
+    #[arg(long, value_enum, default_value_t = LayerKind::Planar)]
+    pub layers: LayerKind,
+    /// How the model is placed
+    #[command(flatten)]
+    pub place: PlaceArguments,
+    /// Which settings to use
+    #[command(flatten)]
+    pub settings: SettingsArguments,
+    /// Write the report as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Write the mesh exactly as it was sliced
+    #[arg(long, value_name = "FILE.stl")]
+    pub export_placed: Option<PathBuf>,
+    /// Do not check the finished program
+    #[arg(long)]
+    pub no_verify: bool,
+}
+
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// The model
+    pub model: PathBuf,
+}
+
+/// Arguments of `orient`.
+#[derive(Debug, Args)]
+pub struct Orient {
+    /// The model
+    pub model: PathBuf,
+    /// Where the turned mesh goes
+    #[arg(short, long, value_name = "OUT.stl")]
+    pub output: Option<PathBuf>,
+    /// How the model is placed
+    #[command(flatten)]
+    pub place: PlaceArguments,
+    /// Which settings to use
+    #[command(flatten)]
+    pub settings: SettingsArguments,
+}
+
+/// Arguments of `verify`.
+#[derive(Debug, Args)]
+pub struct Verify {
+    /// The program
+    pub program: PathBuf,
+    /// The mesh as it was sliced (see `slice --export-placed`)
+    #[arg(long, value_name = "PLACED.stl")]
+    pub model: Option<PathBuf>,
+    /// Which settings to use; the dialect is the one that the program names
+    #[command(flatten)]
+    pub settings: SettingsArguments,
+}
+
+/// Arguments of `preview`.
+#[derive(Debug, Args)]
+pub struct Preview {
+    /// The program
+    pub program: PathBuf,
+    /// Where the picture goes
+    #[arg(short, long, value_name = "FILE.svg")]
+    pub output: PathBuf,
+    /// Draw one layer from above, counted from 0, instead of the whole print
+    #[arg(long, value_name = "K")]
+    pub layer: Option<usize>,
+    /// What the colours of the whole print mean
+    #[arg(long, value_enum, default_value_t = Coloring::Role)]
+    pub color_by: Coloring,
+    /// Which settings to use; the dialect is the one that the program names
+    #[command(flatten)]
+    pub settings: SettingsArguments,
+}
+
+/// What colours mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Coloring {
+    /// How high a bead lies.
+    Height,
+    /// What it is for.
+    Role,
+}
+
+/// What to do with settings.
+#[derive(Debug, Subcommand)]
+pub enum Profile {
+    /// List the built-in profiles
+    List,
+    /// Show every setting with its value and where it comes from
+    Show {
+        /// A built-in profile or a TOML file
+        name: Option<String>,
+        /// More settings
+        #[command(flatten)]
+        settings: SettingsArguments,
+    },
+    /// Check a settings file
+    Check {
+        /// The file
+        file: PathBuf,
+    },
+}
+
+/// Arguments of `model`.
+#[derive(Debug, Args)]
+pub struct Model {
+    /// Its name; without one, all names are listed
+    pub name: Option<String>,
+    /// Where it goes [default: NAME.stl]
+    #[arg(short, long, value_name = "OUT.stl")]
+    pub output: Option<PathBuf>,
+}

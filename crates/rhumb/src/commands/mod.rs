@@ -1,0 +1,90 @@
+//! The commands, one a file. Each returns the exit status of a run that went through.
+
+mod inspect;
+mod model;
+mod orient;
+mod preview;
+mod profile;
+mod slice;
+mod verify;
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use crate::args::{Arguments, Command, PlaceArguments, SettingsArguments};
+use crate::failure::Failure;
+use crate::input;
+use crate::output::{self, Output};
+use crate::place::{Pose, Wish, parse_centre};
+use crate::settings::{Job, Settings};
+
+/// Exit status of a run with nothing to remark.
+pub const DONE: u8 = 0;
+
+/// Exit status of a run whose result needs a look.
+pub const LOOK: u8 = 1;
+
+/// Runs a command and returns its exit status.
+///
+/// # Errors
+///
+/// Why it could not go on.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let manner = &arguments.manner;
+    match &arguments.command {
+        Command::Slice(arguments) => slice::run(arguments, manner),
+        Command::Inspect(arguments) => inspect::run(arguments, manner),
+        Command::Orient(arguments) => orient::run(arguments, manner),
+        Command::Verify(arguments) => verify::run(arguments, manner),
+        Command::Preview(arguments) => preview::run(arguments),
+        Command::Profile(profile) => profile::run(profile, manner),
+        Command::Model(arguments) => model::run(arguments),
+    }
+}
+
+/// Prints to standard output.
+fn say(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes())
+        .and_then(|()| out.flush())
+        .map_err(|error| output::failed(Path::new("standard output"), &error))
+}
+
+/// Prints an object as JSON to standard output.
+fn say_json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    say(&format!("{}\n", to_json(value)?))
+}
+
+fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
+    serde_json::to_string_pretty(value).map_err(|error| Failure::new("Bug", error.to_string()))
+}
+
+/// Writes a whole file, or nothing.
+fn write_file(target: &Path, inputs: &[&Path], bytes: &[u8]) -> Result<(), Failure> {
+    let mut out = Output::create(target, inputs)?;
+    out.file().write_all(bytes).map_err(|error| output::failed(target, &error))?;
+    out.commit()
+}
+
+fn settings(arguments: &SettingsArguments) -> Result<(Settings, Job), Failure> {
+    let settings = Settings::load(&arguments.sources(), &input::read)?;
+    let job = Job::resolve(&settings)?;
+    Ok((settings, job))
+}
+
+fn wish(arguments: &PlaceArguments) -> Result<Wish, Failure> {
+    let scale = arguments.scale * arguments.units.mm();
+    if !(scale.is_finite() && scale > 0.0) {
+        return Err(Failure::new("Usage", format!("--scale {} is not above 0", arguments.scale)));
+    }
+    Ok(Wish {
+        pose: Pose::parse(&arguments.orient)?,
+        centre: parse_centre(&arguments.place)?,
+        scale,
+    })
+}
+
+/// The name of a file for people, without its folder.
+fn display_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}

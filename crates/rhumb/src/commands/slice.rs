@@ -1,0 +1,124 @@
+//! `rhumb slice`: the main job.
+
+use std::io::{BufReader, BufWriter, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+use twin::verify::Verdict;
+
+use super::{DONE, LOOK, display_name, say, say_json, settings, to_json, wish};
+use crate::args::{Manner, Slice};
+use crate::check::{check, refusal};
+use crate::clock;
+use crate::failure::Failure;
+use crate::input;
+use crate::interrupt::Interrupt;
+use crate::output::{self, Output};
+use crate::pipeline::{self, Outcome, Request, Watch};
+use crate::progress::{Bars, Progress, Silent};
+use crate::report::Report;
+use crate::settings::Job;
+use crate::stopwatch::Stopwatch;
+use crate::summary;
+
+pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
+    let interrupt = Interrupt::on_signals();
+    let mut total = Stopwatch::start();
+    let (settings, job) = settings(&arguments.settings)?;
+    let wish = wish(&arguments.place)?;
+    let target = target(arguments);
+    let model = input::read(&arguments.model)?;
+    let inputs = [arguments.model.as_path()];
+    let mut out = Output::create(&target, &inputs)?;
+    let beside = |path: &Option<PathBuf>| path.as_deref().map(|p| Output::create(p, &inputs));
+    let report_file = beside(&arguments.report).transpose()?;
+    let placed_file = beside(&arguments.export_placed).transpose()?;
+
+    let mut progress: Box<dyn Progress> = if manner.quiet || !std::io::stderr().is_terminal() {
+        Box::new(Silent)
+    } else {
+        Box::new(Bars::default())
+    };
+    let name = display_name(&arguments.model);
+    let mut outcome = {
+        let mut text = BufWriter::with_capacity(1 << 16, out.file());
+        let request = Request {
+            model: &model,
+            name: &name,
+            wish,
+            settings: &settings,
+            job: &job,
+            made_at: &clock::now(),
+        };
+        let watch = &mut Watch { progress: &mut *progress, interrupt: &interrupt };
+        let outcome = pipeline::slice(&request, &mut text, watch)?;
+        text.flush().map_err(|error| output::failed(&target, &error))?;
+        outcome
+    };
+    drop(model);
+    let verdict = if arguments.no_verify {
+        None
+    } else {
+        progress.stage("verify", 1);
+        let mut lap = Stopwatch::start();
+        let verdict =
+            check(BufReader::new(out.reread()?), &job, Some(pipeline::part(&outcome)), |_| {})?;
+        outcome.timings.verify = lap.lap();
+        Some(verdict)
+    };
+    drop(progress);
+    interrupt.check()?;
+    if let Some(failure) = verdict.as_ref().and_then(refusal) {
+        return Err(failure);
+    }
+    outcome.timings.total = total.lap();
+    let report = summary::report(&name, &outcome, verdict.as_ref(), &job);
+    if let Some(file) = report_file {
+        fill(file, to_json(&report)?.as_bytes())?;
+    }
+    if let Some(file) = placed_file {
+        fill(file, &mesh::stl::write(pipeline::part(&outcome)))?;
+    }
+    out.commit()?;
+    tell(&report, &outcome, verdict.as_ref(), &job, &target, manner)?;
+    let needs_a_look = !report.verify.findings.is_empty() || outcome.health.guessed;
+    Ok(if needs_a_look { LOOK } else { DONE })
+}
+
+/// Where the program goes: `MODEL.gcode` in the working folder unless the user says.
+fn target(arguments: &Slice) -> PathBuf {
+    arguments.output.clone().unwrap_or_else(|| {
+        let stem = arguments.model.file_stem().filter(|_| arguments.model != Path::new("-"));
+        let mut name = stem.unwrap_or("model".as_ref()).to_owned();
+        name.push(".gcode");
+        PathBuf::from(name)
+    })
+}
+
+fn fill(mut file: Output, bytes: &[u8]) -> Result<(), Failure> {
+    file.file().write_all(bytes).map_err(|error| output::failed(Path::new("report"), &error))?;
+    file.commit()
+}
+
+fn tell(
+    report: &Report,
+    outcome: &Outcome,
+    verdict: Option<&Verdict>,
+    job: &Job,
+    target: &Path,
+    manner: &Manner,
+) -> Result<(), Failure> {
+    let to_standard_output = target == Path::new("-");
+    if manner.json && !to_standard_output {
+        return say_json(report);
+    }
+    if manner.quiet {
+        return Ok(());
+    }
+    let text = summary::text(report, outcome, verdict, job, &display_name(target), manner.verbose);
+    if to_standard_output {
+        // The program itself is on standard output; a summary that cannot be shown is no failure.
+        let _ = std::io::stderr().lock().write_all(text.as_bytes());
+        return Ok(());
+    }
+    say(&text)
+}

@@ -1,0 +1,92 @@
+//! `rhumb verify`: a program proved on a model of the machine.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use mesh::health::solid_from_soup;
+use mesh::stl;
+
+use super::{DONE, LOOK, say, say_json, settings};
+use crate::args::{Manner, SettingsArguments, Verify};
+use crate::check::{check, findings};
+use crate::failure::Failure;
+use crate::input;
+use crate::program_text::duration;
+use crate::settings::Job;
+
+pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
+    let program = input::read(&arguments.program)?;
+    let job = job_of(&program, &arguments.settings)?;
+    let part = arguments.model.as_deref().map(part).transpose()?;
+    let verdict = check(program.as_slice(), &job, part.as_ref(), |_| {})?;
+    if manner.json {
+        say_json(&serde_json::json!({
+            "verify": {"findings": findings(&verdict)},
+            "moves": verdict.totals.moves,
+            "time_s": verdict.totals.time,
+            "filament_mm": verdict.totals.filament,
+            "notes": verdict.notes,
+        }))?;
+    } else {
+        let mut out = String::new();
+        for finding in &verdict.findings {
+            // Writing to a string cannot fail.
+            let _ = writeln!(out, "{finding}");
+        }
+        for omitted in &verdict.omitted {
+            let _ = writeln!(out, "{omitted}");
+        }
+        for note in &verdict.notes {
+            let _ = writeln!(out, "note: {note}");
+        }
+        let totals = &verdict.totals;
+        let _ = writeln!(
+            out,
+            "{} findings; {} moves, {} of motion, bed {:.0} °/s, carriage {:.0} mm/s at most",
+            verdict.findings.len(),
+            totals.moves,
+            duration(totals.time),
+            totals.bed_speed.to_degrees(),
+            totals.rail_speed
+        );
+        say(&out)?;
+    }
+    Ok(if verdict.findings.is_empty() { DONE } else { LOOK })
+}
+
+/// The settings to judge a program by: the dialect and the filament are those that it names itself
+/// at its end, unless the user says otherwise.
+pub(super) fn job_of(program: &[u8], arguments: &SettingsArguments) -> Result<Job, Failure> {
+    let mut arguments = arguments.clone();
+    let mut named = Vec::new();
+    for (name, key) in [("dialect", "dialect"), ("filament_diameter", "filament_diameter_mm")] {
+        if let Some(value) = setting_at_end(program, name) {
+            named.push(format!("{key}={value}"));
+        }
+    }
+    if setting_at_end(program, "fill_density").as_deref() == Some("100%") {
+        named.push("fill_density=1".into());
+    }
+    named.append(&mut arguments.set);
+    arguments.set = named;
+    Ok(settings(&arguments)?.1)
+}
+
+/// The last `; name = value` among the final lines of a program.
+fn setting_at_end(program: &[u8], name: &str) -> Option<String> {
+    // Settings stand in the last 400 kB.
+    let tail = &program[program.len().saturating_sub(400_000)..];
+    let start = format!("; {name} = ");
+    tail.rsplit(|&c| c == b'\n')
+        .find_map(|line| line.strip_prefix(start.as_bytes()))
+        .map(|value| String::from_utf8_lossy(value).trim().to_owned())
+}
+
+fn part(path: &Path) -> Result<mesh::mesh::Mesh, Failure> {
+    let bytes = input::read(path)?;
+    let (soup, _) =
+        stl::read(&bytes).map_err(|error| Failure::new(error.class(), error.to_string()))?;
+    let (solid, _) =
+        solid_from_soup(&soup).map_err(|error| Failure::new(error.class(), error.to_string()))?;
+    Ok(solid.into_mesh())
+}

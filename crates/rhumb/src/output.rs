@@ -1,0 +1,214 @@
+//! Files that go out: whole or not at all.
+//!
+//! What is written goes to a file of its own beside the target and takes the target's place only
+//! when it is complete and checked. Whatever stops rhumb before, the target keeps its old content
+//! and nothing is left behind. Devices and standard output are written at the very end.
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use crate::failure::Failure;
+
+/// A file in the making.
+#[derive(Debug)]
+pub struct Output {
+    destination: Destination,
+    temporary: PathBuf,
+    file: File,
+    is_done: bool,
+}
+
+#[derive(Debug)]
+enum Destination {
+    StandardOutput,
+    /// A device or pipe: written in place.
+    InPlace(PathBuf),
+    /// An ordinary file, replaced at the end.
+    File(PathBuf),
+}
+
+impl Output {
+    /// Opens an output; `-` is standard output. All that can be found out is found out here, before
+    /// any work is done.
+    ///
+    /// # Errors
+    ///
+    /// `OutputIsInput`, `OutputIsDirectory` or `OutputDenied`.
+    pub fn create(target: &Path, inputs: &[&Path]) -> Result<Self, Failure> {
+        let destination = if target == Path::new("-") {
+            Destination::StandardOutput
+        } else {
+            destination(target, inputs)?
+        };
+        let folder = match &destination {
+            Destination::File(path) => match path.parent() {
+                Some(parent) if parent != Path::new("") => parent.to_owned(),
+                _ => PathBuf::from("."),
+            },
+            _ => std::env::temp_dir(),
+        };
+        let (temporary, file) =
+            temporary_in(&folder, target).map_err(|error| denied(target, &error))?;
+        Ok(Self { destination, temporary, file, is_done: false })
+    }
+
+    /// The file to write to.
+    pub fn file(&mut self) -> &mut File {
+        &mut self.file
+    }
+
+    /// Opens what was written for reading it again.
+    ///
+    /// # Errors
+    ///
+    /// `OutputDenied`, when the file cannot be read.
+    pub fn reread(&self) -> Result<File, Failure> {
+        File::open(&self.temporary).map_err(|error| denied(&self.temporary, &error))
+    }
+
+    /// Puts what was written in its place.
+    ///
+    /// # Errors
+    ///
+    /// `OutputFull` or `OutputDenied`; the target is then as it was.
+    pub fn commit(mut self) -> Result<(), Failure> {
+        match &self.destination {
+            Destination::StandardOutput => {
+                let mut out = io::stdout().lock();
+                copy(&mut self.file, &mut out, Path::new("standard output"))?;
+            }
+            Destination::InPlace(path) => {
+                let mut device = OpenOptions::new()
+                    .write(true)
+                    .open(path)
+                    .map_err(|error| denied(path, &error))?;
+                copy(&mut self.file, &mut device, path)?;
+            }
+            Destination::File(path) => {
+                self.file.sync_all().map_err(|error| failed(path, &error))?;
+                if let Ok(old) = fs::metadata(path) {
+                    // A mode that cannot be kept is no reason to lose the result.
+                    let _ = fs::set_permissions(&self.temporary, old.permissions());
+                }
+                fs::rename(&self.temporary, path).map_err(|error| failed(path, &error))?;
+                self.is_done = true;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Output {
+    fn drop(&mut self) {
+        if !self.is_done {
+            // Nothing more can be done about a file that does not go.
+            let _ = fs::remove_file(&self.temporary);
+        }
+    }
+}
+
+/// Says what went wrong while writing.
+#[must_use]
+pub fn failed(target: &Path, error: &io::Error) -> Failure {
+    let class = match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::FileTooLarge | io::ErrorKind::QuotaExceeded => {
+            "OutputFull"
+        }
+        io::ErrorKind::BrokenPipe => "BrokenPipe",
+        _ => "OutputDenied",
+    };
+    Failure::new(class, format!("{}: {error}", target.display()))
+}
+
+fn denied(target: &Path, error: &io::Error) -> Failure {
+    let failure = failed(target, error);
+    if error.kind() == io::ErrorKind::NotFound {
+        failure.hint("the folder must exist already")
+    } else {
+        failure
+    }
+}
+
+fn copy(from: &mut File, to: &mut impl Write, target: &Path) -> Result<(), Failure> {
+    let run = |from: &mut File, to: &mut dyn Write| -> io::Result<()> {
+        from.rewind()?;
+        let mut buffer = vec![0; 1 << 16];
+        loop {
+            let count = from.read(&mut buffer)?;
+            if count == 0 {
+                return to.flush();
+            }
+            to.write_all(&buffer[..count])?;
+        }
+    };
+    run(from, to).map_err(|error| failed(target, &error))
+}
+
+/// Follows links, so that a link is written through and not replaced.
+fn destination(target: &Path, inputs: &[&Path]) -> Result<Destination, Failure> {
+    let resolved = match fs::symlink_metadata(target) {
+        Ok(metadata) if metadata.is_symlink() => match fs::canonicalize(target) {
+            Ok(path) => path,
+            // A link to a file that is not there yet.
+            Err(_) => {
+                let link = fs::read_link(target).map_err(|error| denied(target, &error))?;
+                target.parent().map_or(link.clone(), |parent| parent.join(&link))
+            }
+        },
+        _ => target.to_owned(),
+    };
+    let Ok(metadata) = fs::metadata(&resolved) else { return Ok(Destination::File(resolved)) };
+    if metadata.is_dir() {
+        return Err(Failure::new("OutputIsDirectory", format!("{} is a folder", target.display()))
+            .hint("name the file in it"));
+    }
+    if inputs.iter().any(|input| is_same_file(input, &metadata, &resolved)) {
+        return Err(Failure::new(
+            "OutputIsInput",
+            format!("{} is the input itself", target.display()),
+        )
+        .hint("choose another name with -o"));
+    }
+    if !metadata.is_file() {
+        return Ok(Destination::InPlace(resolved));
+    }
+    if metadata.permissions().readonly() {
+        return Err(Failure::new("OutputDenied", format!("{} is read-only", target.display())));
+    }
+    Ok(Destination::File(resolved))
+}
+
+#[cfg(unix)]
+fn is_same_file(input: &Path, target: &fs::Metadata, _: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    fs::metadata(input)
+        .is_ok_and(|input| input.dev() == target.dev() && input.ino() == target.ino())
+}
+
+#[cfg(not(unix))]
+fn is_same_file(input: &Path, _: &fs::Metadata, target: &Path) -> bool {
+    match (fs::canonicalize(input), fs::canonicalize(target)) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}
+
+/// A new file with a name that no other run uses.
+fn temporary_in(folder: &Path, target: &Path) -> io::Result<(PathBuf, File)> {
+    let stem = target.file_name().unwrap_or_default();
+    for attempt in 0..1000_u32 {
+        let mut name = OsString::from(".");
+        // Long names are cut by the system; the number alone tells runs apart.
+        name.push(if stem.len() <= 200 { stem } else { "long".as_ref() });
+        name.push(format!(".{}-{attempt}.tmp", std::process::id()));
+        let path = folder.join(name);
+        match OpenOptions::new().read(true).write(true).create_new(true).open(&path) {
+            Ok(file) => return Ok((path, file)),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Err(io::Error::new(io::ErrorKind::AlreadyExists, "no free temporary name"))
+}

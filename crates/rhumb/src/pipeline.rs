@@ -1,0 +1,403 @@
+//! The whole slice, from the bytes of a model to the text of a program.
+//!
+//! Layers are worked in windows: the sections and toolpaths of a window in parallel, its plan and
+//! its text in order. Text leaves as soon as a window is planned, so memory holds the mesh and a
+//! window, and the bytes are the same for any number of threads.
+
+use std::collections::VecDeque;
+use std::io::Write;
+use std::path::Path;
+
+use geom::region::Region;
+use machine::gcode::Emitter;
+use machine::program::Step;
+use mesh::health::{Health, solid_from_soup};
+use mesh::mesh::Mesh;
+use mesh::note::Note;
+use mesh::stl;
+use mesh::topology::Solid;
+use nalgebra::Rotation3;
+use plan::planner::{Planner, Totals};
+use rayon::prelude::*;
+use slicer::layer::{Filled, fill_layer};
+use slicer::level::{Level, expected_count, schedule};
+use slicer::section::{Cutter, Section, Tears};
+use slicer::skins::{Neighbours, SKIN_TOLERANCE_MM};
+use slicer::surface::Plane;
+use slicer::toolpath::LostArea;
+
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::output;
+use crate::place::{Fit, Placed, Wish, check_envelope, place, suspect_units};
+use crate::program_text;
+use crate::progress::Progress;
+use crate::report::{Timings, Warning};
+use crate::settings::{Job, Settings};
+use crate::stopwatch::Stopwatch;
+
+/// What to slice and how.
+pub struct Request<'a> {
+    /// The bytes of the STL file.
+    pub model: &'a [u8],
+    /// What to call the model.
+    pub name: &'a str,
+    /// Where it is wanted.
+    pub wish: Wish,
+    /// All settings, for the end of the program.
+    pub settings: &'a Settings,
+    /// The same, as parameters.
+    pub job: &'a Job,
+    /// When the program was made, for its first line.
+    pub made_at: &'a str,
+}
+
+/// Who is told of progress, and who may stop it.
+pub struct Watch<'a> {
+    /// Told what is being done.
+    pub progress: &'a mut dyn Progress,
+    /// Asked before every window.
+    pub interrupt: &'a Interrupt,
+}
+
+/// What came of it, besides the text.
+pub struct Outcome {
+    /// The model's mesh.
+    pub health: Health,
+    /// Where it was put.
+    pub placed: Placed,
+    /// The layers.
+    pub levels: Vec<Level>,
+    /// The sums of the program.
+    pub totals: Totals,
+    /// Area that no bead fits in.
+    pub lost: LostArea,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+    /// Milliseconds by stage.
+    pub timings: Timings,
+}
+
+/// Slices a model and writes the program to `out`.
+///
+/// # Errors
+///
+/// [`Failure`] with what is wrong with model, settings or output.
+pub fn slice(
+    request: &Request<'_>,
+    out: &mut dyn Write,
+    watch: &mut Watch<'_>,
+) -> Result<Outcome, Failure> {
+    let job = request.job;
+    let mut clock = Stopwatch::start();
+    watch.progress.stage("read", 1);
+    let (soup, read) = stl::read(request.model).map_err(|e| unusable(e.class(), &e, e.hint()))?;
+    let read_ms = clock.lap();
+    watch.progress.stage("repair", 1);
+    let soup = if request.wish.scale == 1.0 { soup } else { soup.scaled(request.wish.scale) };
+    let (solid, health) = solid_from_soup(&soup).map_err(|e| unusable(e.class(), &e, e.hint()))?;
+    let health = health.with_read(&read);
+    drop(soup);
+    let repair_ms = clock.lap();
+    watch.progress.stage("orient", 1);
+    let placed = place(&solid, &request.wish, &job.orient);
+    let fit = check_envelope(&placed, job)?;
+    let mut warnings: Vec<Warning> = health.notes.iter().map(warning).collect();
+    warnings.extend(placement_warnings(&solid, &placed, fit, job));
+    drop(solid);
+    let orient_ms = clock.lap();
+
+    let levels = levels(&placed, job)?;
+    // The slicer works in a frame that turns with the part, so that its choices do too.
+    let turned = Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), -placed.azimuth);
+    let upright = placed.solid.moved(|p| turned * p);
+    let mut job = job.clone();
+    job.plan.resample.azimuth = placed.azimuth;
+    let mut text = Emitter::new(out, job.dialect);
+    program_text::head(&mut text, request.name, request.made_at, &job.start).map_err(written)?;
+    let printed = layers(&upright, &levels, &job, &mut text, watch)?;
+    program_text::tail(
+        &mut text,
+        &job.end,
+        &printed.totals,
+        &program_text::Material::of(&job, levels.len()),
+        request.settings,
+    )
+    .map_err(written)?;
+    text.finish().map_err(written)?;
+    warnings.extend(printed.warnings(&job));
+    let timings = Timings {
+        read: read_ms,
+        repair: repair_ms,
+        orient: orient_ms,
+        slice: clock.lap(),
+        ..Timings::default()
+    };
+    let Printed { totals, lost, .. } = printed;
+    Ok(Outcome { health, placed, levels, totals, lost, warnings, timings })
+}
+
+fn unusable(class: &'static str, error: &dyn std::error::Error, hint: Option<String>) -> Failure {
+    let failure = Failure::new(class, error.to_string());
+    match hint {
+        Some(hint) => failure.hint(hint),
+        None => failure,
+    }
+}
+
+fn written(error: std::io::Error) -> Failure {
+    output::failed(Path::new("program"), &error)
+}
+
+fn warning(note: &Note) -> Warning {
+    Warning { code: note.code.to_owned(), message: note.message.clone() }
+}
+
+fn placement_warnings(solid: &Solid, placed: &Placed, fit: Fit, job: &Job) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let mut warn = |code: &str, message: String| {
+        warnings.push(Warning { code: code.to_owned(), message });
+    };
+    // A model that does not stand near the origin was made for another frame.
+    let before = solid.mesh().bounds();
+    let far = before.min.xy().coords.norm().max(before.max.xy().coords.norm());
+    if before.min.z.abs() > RECENTRED_MM || far > job.printer.rail.max {
+        let shift = placed.placement.shift;
+        warn(
+            "Recentred",
+            format!(
+                "the model was moved by ({:.3}, {:.3}, {:.3}) mm onto the bed and the axis",
+                shift.x, shift.y, shift.z
+            ),
+        );
+    }
+    if fit == Fit::Barely {
+        warn("AtEnvelope", "the part reaches to the very end of the machine's travel".into());
+    }
+    if let Some(message) = suspect_units(placed, job) {
+        warn("UnitsSuspect", message);
+    }
+    warnings
+}
+
+/// How far above or below z = 0 a model may stand without a word, mm.
+const RECENTRED_MM: f64 = 0.01;
+
+/// More layers than any printer lays: a setting or a unit is wrong.
+const MOST_LAYERS: f64 = 100_000.0;
+
+fn levels(placed: &Placed, job: &Job) -> Result<Vec<Level>, Failure> {
+    let height = placed.solid.mesh().bounds().max.z;
+    let expected = expected_count(height, &job.schedule);
+    if expected > MOST_LAYERS {
+        return Err(Failure::new(
+            "LimitExceeded",
+            format!("{expected:.0} layers are too many; the limit is {MOST_LAYERS}"),
+        ));
+    }
+    Ok(schedule(height, &job.schedule))
+}
+
+/// Layers that are worked at once. Enough to keep all threads busy; a window of a fine model is a
+/// few megabytes.
+const WINDOW: usize = 64;
+
+/// What the layers amount to.
+#[derive(Default)]
+struct Printed {
+    totals: Totals,
+    lost: LostArea,
+    lost_volume: f64,
+    tears: Tears,
+    torn_layers: usize,
+    floating: Option<(usize, f64)>,
+    adhesion_out_of_reach: usize,
+}
+
+fn layers(
+    solid: &Solid,
+    levels: &[Level],
+    job: &Job,
+    text: &mut Emitter<&mut dyn Write>,
+    watch: &mut Watch<'_>,
+) -> Result<Printed, Failure> {
+    let mut printed = Printed::default();
+    let mut stack = Stack::new(solid, levels, job);
+    let mut planner = Planner::new(&job.printer, job.plan);
+    watch.progress.stage("slice", levels.len() as u64);
+    for start in (0..levels.len()).step_by(WINDOW) {
+        watch.interrupt.check()?;
+        let window = start..(start + WINDOW).min(levels.len());
+        stack.reach(&window, &mut printed);
+        let filled = stack.fill(window.clone());
+        for (index, filled) in window.zip(filled) {
+            printed.count(index, &filled, &levels[index]);
+            let steps = planner.layer(&filled.paths).map_err(|error| {
+                Failure::new("OutOfEnvelope", error.to_string())
+                    .hint("move the part off the axis with --place, or correct the calibration")
+            })?;
+            write(text, &steps)?;
+            watch.progress.advance(1);
+        }
+    }
+    let (steps, totals) =
+        planner.finish().map_err(|error| Failure::new("Bug", error.to_string()))?;
+    write(text, &steps)?;
+    printed.totals = totals;
+    if printed.totals.extruded() <= 0.0 {
+        return Err(Failure::new(
+            "NothingToPrint",
+            format!(
+                "no bead fits in any of the {} layers; the part is thinner than {} mm everywhere",
+                levels.len(),
+                job.paths.thin.least_width
+            ),
+        )
+        .hint("check the units of the file (--units), or print with a finer nozzle"));
+    }
+    Ok(printed)
+}
+
+fn write(text: &mut Emitter<&mut dyn Write>, steps: &[Step]) -> Result<(), Failure> {
+    steps.iter().try_for_each(|step| text.step(step)).map_err(written)
+}
+
+/// The sections that a window needs: its own, and those above and below that decide on its skins.
+struct Stack<'a> {
+    cutter: Cutter<'a>,
+    levels: &'a [Level],
+    job: &'a Job,
+    /// Sections from `first` on, each with a thinned-out copy for comparing layers.
+    sections: VecDeque<(Section, Region)>,
+    first: usize,
+}
+
+impl<'a> Stack<'a> {
+    fn new(solid: &'a Solid, levels: &'a [Level], job: &'a Job) -> Self {
+        let cutter = Cutter::new(solid, &Plane, levels);
+        Self { cutter, levels, job, sections: VecDeque::new(), first: 0 }
+    }
+
+    /// Cuts what is missing for a window and drops what no later window needs.
+    fn reach(&mut self, window: &std::ops::Range<usize>, printed: &mut Printed) {
+        let skins = &self.job.paths.skins;
+        let keep_from = window.start.saturating_sub(skins.bottom_layers.max(1));
+        while self.first < keep_from {
+            self.sections.pop_front();
+            self.first += 1;
+        }
+        let have = self.first + self.sections.len();
+        let want = (window.end + skins.top_layers.max(1)).min(self.levels.len());
+        let cut: Vec<(Section, Region)> = (have..want)
+            .into_par_iter()
+            .map(|k| {
+                let section = self.cutter.section(k, self.job.paths.tolerance);
+                let cover = section.region.thinned(SKIN_TOLERANCE_MM);
+                (section, cover)
+            })
+            .collect();
+        for (section, _) in &cut {
+            printed.count_tears(&section.tears);
+        }
+        self.sections.extend(cut);
+    }
+
+    fn fill(&self, window: std::ops::Range<usize>) -> Vec<Filled> {
+        window
+            .into_par_iter()
+            .map(|k| {
+                let (section, _) = &self.sections[k - self.first];
+                let cover = |i: usize| self.sections.get(i.checked_sub(self.first)?).map(|s| &s.1);
+                let skins = &self.job.paths.skins;
+                let neighbours = Neighbours {
+                    above: (k + 1..=k + skins.top_layers.max(1)).map_while(cover).collect(),
+                    below: (k.saturating_sub(skins.bottom_layers.max(1))..k)
+                        .rev()
+                        .map_while(cover)
+                        .collect(),
+                };
+                fill_layer(&self.levels[k], &section.region, &neighbours, &Plane, &self.job.paths)
+            })
+            .collect()
+    }
+}
+
+impl Printed {
+    fn count_tears(&mut self, tears: &Tears) {
+        self.torn_layers += usize::from(tears.closed + tears.dropped > 0);
+        self.tears.closed += tears.closed;
+        self.tears.widest = self.tears.widest.max(tears.widest);
+        self.tears.dropped += tears.dropped;
+        self.tears.dropped_length += tears.dropped_length;
+    }
+
+    fn count(&mut self, index: usize, filled: &Filled, level: &Level) {
+        let lost = &filled.paths.lost;
+        self.lost.area += lost.area;
+        self.lost_volume += lost.area * level.thickness();
+        if lost.worst_area > self.lost.worst_area {
+            (self.lost.worst_area, self.lost.worst) = (lost.worst_area, lost.worst);
+        }
+        if filled.floating_area > 0.0 && self.floating.is_none() {
+            self.floating = Some((index, filled.floating_area));
+        }
+        self.adhesion_out_of_reach += filled.adhesion_out_of_reach;
+    }
+
+    fn warnings(&self, job: &Job) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        let mut warn = |code: &str, message: String| {
+            warnings.push(Warning { code: code.to_owned(), message });
+        };
+        if self.lost.worst_area > WORTH_TELLING_MM2 {
+            warn(
+                "ThinFeatures",
+                format!(
+                    "{:.2} mm³ are thinner than {} mm and stay empty; the largest such place has \
+                     {:.3} mm²",
+                    self.lost_volume, job.paths.thin.least_width, self.lost.worst_area
+                ),
+            );
+        }
+        if let Some((layer, area)) = self.floating {
+            warn(
+                "FloatingPart",
+                format!("layer {layer} begins {area:.2} mm² in mid-air, with nothing below"),
+            );
+        }
+        if self.torn_layers > 0 {
+            warn(
+                "OpenOutlines",
+                format!(
+                    "outlines of {} layers are open: {} gaps up to {:.2} mm were closed, {} pieces \
+                     ({:.1} mm) were dropped",
+                    self.torn_layers,
+                    self.tears.closed,
+                    self.tears.widest,
+                    self.tears.dropped,
+                    self.tears.dropped_length
+                ),
+            );
+        }
+        if self.adhesion_out_of_reach > 0 {
+            warn(
+                "AdhesionLeftOut",
+                format!(
+                    "{} loops of skirt or brim are out of reach and were left out",
+                    self.adhesion_out_of_reach
+                ),
+            );
+        }
+        warnings
+    }
+}
+
+/// Lost places smaller than this are the sharp corners of every part, mm²: a quarter of a bead's
+/// cross-section seen from above.
+const WORTH_TELLING_MM2: f64 = 0.04;
+
+/// Returns the part as it was sliced.
+#[must_use]
+pub fn part(outcome: &Outcome) -> &Mesh {
+    outcome.placed.solid.mesh()
+}

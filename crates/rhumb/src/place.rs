@@ -1,0 +1,285 @@
+//! How the model comes to stand on the bed.
+
+use mesh::measure;
+use mesh::mesh::Mesh;
+use mesh::orient::{OrientParams, Rest, rest};
+use mesh::place::{Placement, footprint, reference_azimuth};
+use mesh::topology::Solid;
+use nalgebra::{Point2, Rotation3, Vector3};
+
+use crate::failure::Failure;
+use crate::settings::Job;
+
+/// How the model is laid down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pose {
+    /// On its largest flat face.
+    Flat,
+    /// As it is.
+    Keep,
+    /// Turned about x, then y, then z, radians.
+    Turned([f64; 3]),
+}
+
+/// Where the user wants the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wish {
+    /// How it is laid down.
+    pub pose: Pose,
+    /// Where its footprint is centred, mm from the axis.
+    pub centre: Point2<f64>,
+    /// Millimetres in a unit of the file, times the scale.
+    pub scale: f64,
+}
+
+impl Default for Wish {
+    fn default() -> Self {
+        Self { pose: Pose::Flat, centre: Point2::origin(), scale: 1.0 }
+    }
+}
+
+impl Pose {
+    /// Reads `flat`, `keep` or three angles in degrees.
+    ///
+    /// # Errors
+    ///
+    /// `Usage`.
+    pub fn parse(text: &str) -> Result<Self, Failure> {
+        match text {
+            "flat" => Ok(Self::Flat),
+            "keep" => Ok(Self::Keep),
+            _ => numbers::<3>(text)
+                .map(|angles| Self::Turned(angles.map(f64::to_radians)))
+                .ok_or_else(|| {
+                    Failure::new(
+                        "Usage",
+                        format!("--orient {text:?} is not flat, keep or RX,RY,RZ"),
+                    )
+                }),
+        }
+    }
+}
+
+/// Reads `X,Y`.
+///
+/// # Errors
+///
+/// `Usage`.
+pub fn parse_centre(text: &str) -> Result<Point2<f64>, Failure> {
+    numbers::<2>(text)
+        .map(Point2::from)
+        .ok_or_else(|| Failure::new("Usage", format!("--place {text:?} is not X,Y")))
+}
+
+/// `N` finite numbers with commas between them.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let mut numbers = [0.0; N];
+    let mut parts = text.split(',');
+    for number in &mut numbers {
+        *number = parts.next()?.trim().parse().ok().filter(|n: &f64| n.is_finite())?;
+    }
+    parts.next().is_none().then_some(numbers)
+}
+
+/// A model on the bed.
+pub struct Placed {
+    /// The part, in the part frame.
+    pub solid: Solid,
+    /// From the model to the part.
+    pub placement: Placement,
+    /// What it rests on; `None` when the user chose the pose.
+    pub rest: Option<Rest>,
+    /// A direction that turns with the part, radians.
+    pub azimuth: f64,
+    /// Farthest point from the rotation axis, mm.
+    pub reach: f64,
+}
+
+/// Lays a solid down and puts it in its place.
+#[must_use]
+pub fn place(solid: &Solid, wish: &Wish, orient: &OrientParams) -> Placed {
+    let (rotation, rest) = match wish.pose {
+        Pose::Flat => {
+            let (rotation, rest) = rest(solid.mesh(), orient);
+            (rotation, Some(rest))
+        }
+        Pose::Keep => (Rotation3::identity(), None),
+        // nalgebra takes roll, pitch and yaw in this very order: about x, then y, then z.
+        Pose::Turned([x, y, z]) => (Rotation3::from_euler_angles(x, y, z), None),
+    };
+    let mut placement = Placement::on_bed(solid.mesh(), &rotation);
+    let azimuth = whole_places(reference_azimuth(&placement.mesh(solid.mesh())));
+    placement.shift += Vector3::new(wish.centre.x, wish.centre.y, 0.0);
+    let solid = solid.moved(|p| placement.point(p));
+    let reach = solid.mesh().vertices.iter().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
+    Placed { solid, placement, rest, azimuth, reach }
+}
+
+/// The nearest angle that a program can say exactly (0.0001°): the program of a part that is turned
+/// by such an angle is then the same but for that angle, rounding included.
+fn whole_places(radians: f64) -> f64 {
+    ((radians.to_degrees() * 1e4).round() / 1e4).to_radians()
+}
+
+/// Share of the rail's end within which a part counts as being at it.
+const NEARLY_MM: f64 = 0.5;
+
+/// What fits in the machine, and what nearly does not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fit {
+    /// With room to spare.
+    Well,
+    /// Just.
+    Barely,
+}
+
+/// Checks that the part is within reach and not too tall.
+///
+/// # Errors
+///
+/// `OutOfEnvelope` or `NothingToPrint`, with a guess at the units where that would explain it.
+pub fn check_envelope(placed: &Placed, job: &Job) -> Result<Fit, Failure> {
+    let size = placed.solid.mesh().bounds().size();
+    let (reach, height) = (placed.reach, size.z);
+    let (most_reach, most_height) = (job.printer.rail.max, job.printer.lift.max);
+    // Neither NaN nor infinity may pass.
+    if !(reach <= most_reach && height <= most_height) {
+        let what = if reach <= most_reach {
+            format!("the part is {height:.1} mm tall; the lift reaches {most_height} mm")
+        } else {
+            format!(
+                "the part reaches {reach:.1} mm from the rotation axis; the carriage reaches \
+                 {most_reach} mm"
+            )
+        };
+        return Err(Failure::new("OutOfEnvelope", what).hint(too_large(&size, job)));
+    }
+    let least_height = job.schedule.first_layer_height / 2.0;
+    if height <= least_height || size.x.max(size.y) < job.paths.thin.least_width {
+        return Err(Failure::new(
+            "NothingToPrint",
+            format!(
+                "the part measures {:.3} x {:.3} x {:.3} mm: thinner than half a layer or \
+                 narrower than any bead",
+                size.x, size.y, size.z
+            ),
+        )
+        .hint(too_small(&size, job)));
+    }
+    let nearly = reach > most_reach - NEARLY_MM || height > most_height - NEARLY_MM;
+    Ok(if nearly { Fit::Barely } else { Fit::Well })
+}
+
+/// Other units in which a size would make sense: name, factor.
+const OTHER_UNITS: [(&str, f64); 3] = [
+    ("metres (--units m)", 1000.0),
+    ("inches (--units inch)", 25.4),
+    ("micrometres (--scale 0.001)", 0.001),
+];
+
+fn sensible(size: &Vector3<f64>, factor: f64, job: &Job) -> bool {
+    let scaled = size * factor;
+    let across = scaled.x.hypot(scaled.y) / 2.0;
+    across <= job.printer.rail.max
+        && scaled.z <= job.printer.lift.max
+        && scaled.max() >= SENSIBLE_SIZE_MM
+}
+
+/// A part smaller than this in all directions is more likely in other units.
+const SENSIBLE_SIZE_MM: f64 = 2.0;
+
+fn too_large(size: &Vector3<f64>, job: &Job) -> String {
+    match OTHER_UNITS.iter().find(|(_, factor)| *factor < 1.0 && sensible(size, *factor, job)) {
+        Some((name, _)) => format!("are the units of the file {name}?"),
+        None => "turn it with --orient, scale it with --scale, or cut it".into(),
+    }
+}
+
+fn too_small(size: &Vector3<f64>, job: &Job) -> String {
+    match OTHER_UNITS.iter().find(|(_, factor)| *factor > 1.0 && sensible(size, *factor, job)) {
+        Some((name, _)) => format!("are the units of the file {name}?"),
+        None => "check the units of the file (--units) or scale it with --scale".into(),
+    }
+}
+
+/// Returns what to say when a part that prints is suspiciously small.
+#[must_use]
+pub fn suspect_units(placed: &Placed, job: &Job) -> Option<String> {
+    let size = placed.solid.mesh().bounds().size();
+    (size.max() < SENSIBLE_SIZE_MM).then(|| {
+        format!(
+            "the part measures only {:.2} x {:.2} x {:.2} mm; {}",
+            size.x,
+            size.y,
+            size.z,
+            too_small(&size, job)
+        )
+    })
+}
+
+/// Returns the volume of a mesh, mm³.
+#[must_use]
+pub fn volume(mesh: &Mesh) -> f64 {
+    measure::volume_mm3(mesh)
+}
+
+/// Returns the smallest circle around the footprint of a mesh: centre and radius, mm.
+#[must_use]
+pub fn footprint_of(mesh: &Mesh) -> Option<(Point2<f64>, f64)> {
+    footprint(mesh).map(|circle| (circle.centre, circle.radius))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+    use mesh::shapes;
+
+    fn job() -> Job {
+        Job::resolve(&Settings::defaults()).unwrap()
+    }
+
+    fn placed(mesh: Mesh, wish: &Wish) -> Placed {
+        place(&Solid::new(mesh), wish, &job().orient)
+    }
+
+    #[test]
+    fn poses_are_read() {
+        assert_eq!(Pose::parse("flat").unwrap(), Pose::Flat);
+        let Pose::Turned(angles) = Pose::parse("90, 0,-45").unwrap() else { panic!("turned") };
+        assert!((angles[0] - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+        for bad in ["up", "1,2", "1,2,3,4", "1,2,nan", ""] {
+            assert_eq!(Pose::parse(bad).unwrap_err().class(), "Usage", "{bad}");
+        }
+        assert_eq!(parse_centre("3,-4").unwrap(), Point2::new(3.0, -4.0));
+    }
+
+    #[test]
+    fn a_part_stands_centred_on_the_bed_or_where_it_is_wanted() {
+        let wish = Wish { centre: Point2::new(30.0, 0.0), ..Wish::default() };
+        let part = placed(shapes::cube(20.0), &wish);
+        let bounds = part.solid.mesh().bounds();
+        assert!(bounds.min.z.abs() < 1e-12);
+        assert!((bounds.min.x - 20.0).abs() < 1e-9 && (bounds.max.x - 40.0).abs() < 1e-9);
+        assert!((part.reach - 40.0_f64.hypot(10.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_with_a_guess_at_the_units() {
+        let check = |size: f64| {
+            let part = placed(shapes::cube(size), &Wish::default());
+            check_envelope(&part, &job())
+        };
+        assert_eq!(check(20.0).unwrap(), Fit::Well);
+        let large = check(20_000.0).unwrap_err();
+        assert_eq!(large.class(), "OutOfEnvelope");
+        assert!(large.to_string().contains("units"), "{large}");
+        let tiny = check(0.02).unwrap_err();
+        assert_eq!(tiny.class(), "NothingToPrint");
+        assert!(tiny.to_string().contains("metres"), "{tiny}");
+        assert_eq!(check(1e30).unwrap_err().class(), "OutOfEnvelope");
+        let reach = 120.0 * std::f64::consts::SQRT_2;
+        assert_eq!(check(reach - 0.1).unwrap(), Fit::Barely);
+        assert!(suspect_units(&placed(shapes::cube(0.8), &Wish::default()), &job()).is_some());
+    }
+}

@@ -1,0 +1,185 @@
+//! What a slice amounts to, as data: `--report` writes it, `--json` prints it.
+
+use serde::Serialize;
+
+/// The report. Lengths mm, areas mm², volumes mm³, times s unless a name says otherwise.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// Version of rhumb.
+    pub rhumb: &'static str,
+    /// What came in.
+    pub model: Model,
+    /// Its mesh.
+    pub mesh: MeshHealth,
+    /// How it was laid down.
+    pub orientation: Orientation,
+    /// Its layers.
+    pub layers: Layers,
+    /// The print.
+    pub print: Print,
+    /// What the check of the finished program found.
+    pub verify: Verify,
+    /// Milliseconds spent in each stage.
+    pub timings_ms: Timings,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// What came in.
+#[derive(Debug, Clone, Serialize)]
+pub struct Model {
+    /// Name of the file.
+    pub file: String,
+    /// Facets in the file.
+    pub triangles: usize,
+    /// Volume as sliced.
+    pub volume_mm3: f64,
+    /// Least and greatest corner as placed.
+    pub bounds_mm: [[f64; 3]; 2],
+}
+
+/// The mesh and what was mended.
+#[derive(Debug, Clone, Serialize)]
+pub struct MeshHealth {
+    /// Connected parts.
+    pub shells: usize,
+    /// Sides with one facet, after repair.
+    pub open_edges: usize,
+    /// Sides with more than two facets.
+    pub nonmanifold_edges: usize,
+    /// Facets turned over.
+    pub flipped: usize,
+    /// Facets without area removed.
+    pub degenerate: usize,
+    /// Facets that occurred twice removed.
+    pub duplicate: usize,
+    /// Codes of what was done.
+    pub repairs: Vec<String>,
+}
+
+/// How the part was laid down.
+#[derive(Debug, Clone, Serialize)]
+pub struct Orientation {
+    /// Rotation from the model to the part, rows.
+    pub part_from_model: [[f64; 3]; 3],
+    /// Direction in the model that points down.
+    pub normal_model: [f64; 3],
+    /// Area of the flat faces in that direction, both ways.
+    pub area_mm2: f64,
+    /// All choices, the best first.
+    pub candidates: Vec<OrientationCandidate>,
+}
+
+/// One way to lay the part down.
+#[derive(Debug, Clone, Serialize)]
+pub struct OrientationCandidate {
+    /// Direction in the model that points down.
+    pub normal_model: [f64; 3],
+    /// Area of the flat faces in that direction, both ways.
+    pub area_mm2: f64,
+    /// Area that rests on the bed.
+    pub bed_area_mm2: f64,
+    /// Height of the part.
+    pub height_mm: f64,
+}
+
+/// The layers.
+#[derive(Debug, Clone, Serialize)]
+pub struct Layers {
+    /// The surface that they follow.
+    pub kind: &'static str,
+    /// How many.
+    pub count: usize,
+    /// Upper levels.
+    pub levels_mm: Vec<f64>,
+    /// Thicknesses.
+    pub heights_mm: Vec<f64>,
+    /// Flat faces and how far the nearest layer misses them.
+    pub flats: Vec<Flat>,
+    /// Area too thin for any bead, summed over the layers.
+    pub lost_mm2: f64,
+}
+
+/// A flat face.
+#[derive(Debug, Clone, Serialize)]
+pub struct Flat {
+    /// Its height.
+    pub z_mm: f64,
+    /// Its area.
+    pub area_mm2: f64,
+    /// Distance of the nearest layer.
+    pub error_mm: f64,
+}
+
+/// The print.
+#[derive(Debug, Clone, Serialize, Default)]
+pub struct Print {
+    /// Estimated time.
+    pub time_s: f64,
+    /// Filament.
+    pub filament_mm: f64,
+    /// Its weight.
+    pub filament_g: f64,
+    /// Volume laid, skirt and brim included.
+    pub extruded_mm3: f64,
+    /// Volume of the part itself.
+    pub part_mm3: f64,
+    /// Way without laying material.
+    pub travel_mm: f64,
+    /// Moves of the nozzle.
+    pub moves: usize,
+    /// Times that filament is drawn back.
+    pub retractions: usize,
+    /// Turns of the bed, whichever way.
+    pub bed_turns: f64,
+}
+
+/// What the check found.
+#[derive(Debug, Clone, Serialize, Default)]
+pub struct Verify {
+    /// Findings; empty when all is well.
+    pub findings: Vec<Finding>,
+}
+
+/// One finding.
+#[derive(Debug, Clone, Serialize)]
+pub struct Finding {
+    /// What was checked.
+    pub check: &'static str,
+    /// `error` or `warning`.
+    pub severity: &'static str,
+    /// Line of the program.
+    pub line: usize,
+    /// What was found.
+    pub measured: f64,
+    /// What is allowed.
+    pub limit: f64,
+    /// In words.
+    pub message: String,
+}
+
+/// Milliseconds by stage.
+#[derive(Debug, Clone, Serialize, Default)]
+pub struct Timings {
+    /// Reading the file.
+    pub read: f64,
+    /// Welding and repair.
+    pub repair: f64,
+    /// Orientation and placement.
+    pub orient: f64,
+    /// Sections, toolpaths, plan and text.
+    pub slice: f64,
+    /// Reading the program back.
+    pub verify: f64,
+    /// Everything.
+    pub total: f64,
+}
+
+/// A remark.
+#[derive(Debug, Clone, Serialize, PartialEq, Eq)]
+pub struct Warning {
+    /// A word that scripts rely on.
+    pub code: String,
+    /// In words.
+    pub message: String,
+}

@@ -1,0 +1,16 @@
+//! Settings: what a printer is, what a material needs, what a print should be.
+//!
+//! Three files, each may inherit from another; the command line wins over all. [`key`] lists every
+//! setting with its unit, range, default and meaning, [`file`] reads TOML, [`merge`] puts the
+//! sources together and remembers which one each value came from, [`resolve`] turns the result into
+//! the parameters of each stage, and [`template`] fills the start and end programs.
+
+pub mod file;
+pub mod key;
+pub mod merge;
+pub mod resolve;
+pub mod template;
+
+pub use key::{KEYS, Key, Kind, Section, Value};
+pub use merge::{Settings, Source, Sources};
+pub use resolve::Job;

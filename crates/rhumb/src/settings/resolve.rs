@@ -1,0 +1,361 @@
+//! From settings to the parameters of each stage: the only place that looks values up by name.
+
+use geom::tolerance::Tolerances;
+use machine::gcode::Dialect;
+use machine::kinematics::Alignment;
+use machine::profile::{Axis, Printer, Turntable};
+use machine::program::{BedTurn, Joints};
+use mesh::orient::OrientParams;
+use plan::cooling::CoolingParams;
+use plan::order::OrderParams;
+use plan::planner::{HeatParams, PlanParams};
+use plan::resample::ResampleParams;
+use plan::route::{FilamentParams, Speeds};
+use plan::seam::SeamPosition;
+use slicer::adhesion::AdhesionParams;
+use slicer::infill::{InfillParams, Pattern};
+use slicer::layer::PathParams;
+use slicer::level::ScheduleParams;
+use slicer::skins::SkinParams;
+use slicer::thin::ThinParams;
+use slicer::walls::WallParams;
+
+use super::key::{Key, Value};
+use super::merge::Settings;
+use super::template;
+use crate::failure::Failure;
+
+/// Everything that a slice needs to know, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Job {
+    /// The machine.
+    pub printer: Printer,
+    /// The words of its program.
+    pub dialect: Dialect,
+    /// What counts as one flat face.
+    pub orient: OrientParams,
+    /// Where layers lie.
+    pub schedule: ScheduleParams,
+    /// How layers are filled.
+    pub paths: PathParams,
+    /// How lines become moves; the azimuth is the part's and set later.
+    pub plan: PlanParams,
+    /// Grams in a mm³ of filament.
+    pub density_g_per_mm3: f64,
+    /// Program before the print.
+    pub start: Vec<String>,
+    /// Program after the print.
+    pub end: Vec<String>,
+}
+
+impl Job {
+    /// Checks settings against each other and returns the parameters of all stages.
+    ///
+    /// # Errors
+    ///
+    /// `ConfigRange` or `ConfigConflict` for values that do not fit together.
+    pub fn resolve(settings: &Settings) -> Result<Self, Failure> {
+        let get = Lookup(settings);
+        let printer = printer(&get);
+        let dialect = Dialect::by_name(get.text("dialect"))
+            .ok_or_else(|| conflict("there is no such dialect", get.text("dialect")))?;
+        let tolerances = Tolerances::new(get.number("simplify_mm"), get.number("chord_mm"))
+            .map_err(|error| Failure::new("ConfigConflict", error.to_string()))?;
+        check_printer(&printer)?;
+        check_layers(&get)?;
+        Ok(Self {
+            orient: OrientParams {
+                class_tolerance_rad: get.number("flat_angle_deg").to_radians(),
+                overhang_rad: get.number("overhang_angle_deg").to_radians(),
+            },
+            schedule: ScheduleParams {
+                first_layer_height: get.number("first_layer_height_mm"),
+                layer_height: get.number("layer_height_mm"),
+            },
+            paths: paths(&get, &printer, &tolerances),
+            plan: plan(&get, dialect, &tolerances),
+            density_g_per_mm3: get.number("filament_density_g_per_cm3") / 1000.0,
+            start: template::fill(get.text("start_gcode"), "start_gcode", settings)?,
+            end: template::fill(get.text("end_gcode"), "end_gcode", settings)?,
+            printer,
+            dialect,
+        })
+    }
+}
+
+fn conflict(what: &str, value: &str) -> Failure {
+    Failure::new("ConfigConflict", format!("{what}: {value:?}"))
+}
+
+fn printer(get: &Lookup<'_>) -> Printer {
+    Printer {
+        name: get.text("printer_model").to_owned(),
+        rail: Axis {
+            min: get.number("rail_min_mm"),
+            max: get.number("rail_max_mm"),
+            speed: get.number("rail_speed_mm_per_s"),
+            acceleration: get.number("rail_acceleration_mm_per_s2"),
+        },
+        lift: Axis {
+            min: 0.0,
+            max: get.number("z_max_mm"),
+            speed: get.number("z_speed_mm_per_s"),
+            acceleration: get.number("z_acceleration_mm_per_s2"),
+        },
+        bed: Turntable {
+            speed: get.number("bed_speed_deg_per_s").to_radians(),
+            acceleration: get.number("bed_acceleration_deg_per_s2").to_radians(),
+        },
+        path_acceleration: get.number("path_acceleration_mm_per_s2"),
+        rail_jerk: get.number("rail_jerk_mm_per_s"),
+        bed_jerk: get.number("bed_jerk_deg_per_s").to_radians(),
+        filament_speed: get.number("retract_speed_mm_per_s"),
+        nozzle_diameter: get.number("nozzle_diameter_mm"),
+        axis_clearance: get.number("axis_clearance_mm"),
+        moves_per_second: get.number("moves_per_second"),
+        home: Joints {
+            s: get.number("home_rail_mm"),
+            turn: BedTurn::default(),
+            z: get.number("home_z_mm"),
+        },
+        nozzle_temperature_max: get.number("max_nozzle_temperature_c"),
+        nozzle_temperature_min_extrude: get.number("min_extrude_temperature_c"),
+        bed_temperature_max: get.number("max_bed_temperature_c"),
+        alignment: Alignment::default(),
+    }
+}
+
+fn check_printer(printer: &Printer) -> Result<(), Failure> {
+    let (rail, lift) = (&printer.rail, &printer.lift);
+    if rail.min >= rail.max {
+        return Err(Failure::new(
+            "ConfigConflict",
+            format!("rail_min_mm = {} is not below rail_max_mm = {}", rail.min, rail.max),
+        ));
+    }
+    if !rail.reaches(printer.home.s) || !lift.reaches(printer.home.z) {
+        return Err(Failure::new(
+            "ConfigConflict",
+            format!(
+                "home_rail_mm = {} or home_z_mm = {} lies outside of the travel of its axis",
+                printer.home.s, printer.home.z
+            ),
+        ));
+    }
+    Ok(())
+}
+
+fn check_layers(get: &Lookup<'_>) -> Result<(), Failure> {
+    let (least, greatest) = (get.number("min_layer_height_mm"), get.number("max_layer_height_mm"));
+    for name in ["layer_height_mm", "first_layer_height_mm"] {
+        let height = get.number(name);
+        if height < least || height > greatest {
+            return Err(Failure::new(
+                "ConfigRange",
+                format!(
+                    "{name} = {height} is out of range; this printer lays {least} to {greatest} mm"
+                ),
+            )
+            .hint("min_layer_height_mm and max_layer_height_mm belong to the printer settings"));
+        }
+    }
+    let thickest = get.number("layer_height_mm").max(get.number("first_layer_height_mm"));
+    let nozzle = get.number("nozzle_diameter_mm");
+    for name in WIDTHS {
+        let width = get.number(name);
+        // Below its thickness a line is no bead, above about three bores it does not form one.
+        if width < thickest || width > 3.0 * nozzle {
+            return Err(Failure::new(
+                "ConfigRange",
+                format!(
+                    "{name} = {width} is out of range; layers of {thickest} mm and a nozzle of \
+                     {nozzle} mm give beads from {thickest} to {} mm",
+                    3.0 * nozzle
+                ),
+            ));
+        }
+    }
+    let (thinnest, widest) = (get.number("thin_width_min_mm"), get.number("thin_width_max_mm"));
+    if thinnest >= widest {
+        return Err(Failure::new(
+            "ConfigConflict",
+            format!("thin_width_min_mm = {thinnest} is not below thin_width_max_mm = {widest}"),
+        ));
+    }
+    Ok(())
+}
+
+const WIDTHS: [&str; 5] = [
+    "external_perimeter_extrusion_width_mm",
+    "perimeter_extrusion_width_mm",
+    "infill_extrusion_width_mm",
+    "solid_infill_extrusion_width_mm",
+    "top_infill_extrusion_width_mm",
+];
+
+fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathParams {
+    let density = get.number("fill_density");
+    PathParams {
+        walls: WallParams {
+            count: get.count("perimeters"),
+            external_width: get.number("external_perimeter_extrusion_width_mm"),
+            width: get.number("perimeter_extrusion_width_mm"),
+        },
+        thin: ThinParams {
+            least_width: get.number("thin_width_min_mm"),
+            greatest_width: get.number("thin_width_max_mm"),
+        },
+        skins: SkinParams {
+            top_layers: get.count("top_solid_layers"),
+            bottom_layers: get.count("bottom_solid_layers"),
+            solid_below_area: get.number("solid_infill_below_area_mm2"),
+            all_solid: density >= 1.0,
+        },
+        infill: InfillParams {
+            density,
+            pattern: pattern(get.text("fill_pattern")),
+            solid_pattern: pattern(get.text("solid_fill_pattern")),
+            angle: get.number("fill_angle_deg").to_radians(),
+            width: get.number("infill_extrusion_width_mm"),
+            solid_width: get.number("solid_infill_extrusion_width_mm"),
+            top_width: get.number("top_infill_extrusion_width_mm"),
+        },
+        adhesion: AdhesionParams {
+            skirts: get.count("skirts"),
+            skirt_distance: get.number("skirt_distance_mm"),
+            brim_width: get.number("brim_width_mm"),
+            brim_separation: get.number("brim_separation_mm"),
+            reach: printer.rail.max,
+        },
+        tolerance: tolerances.simplify_mm(),
+    }
+}
+
+fn pattern(word: &str) -> Pattern {
+    match word {
+        "grid" => Pattern::Grid,
+        "concentric" => Pattern::Concentric,
+        "archimedeanchords" => Pattern::Archimedean,
+        _ => Pattern::Rectilinear,
+    }
+}
+
+fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanParams {
+    let diameter = get.number("filament_diameter_mm");
+    PlanParams {
+        order: OrderParams {
+            seam: match get.text("seam_position") {
+                "nearest" => SeamPosition::Nearest,
+                _ => SeamPosition::Aligned,
+            },
+            external_first: get.switch("external_perimeters_first"),
+        },
+        speeds: Speeds {
+            external_perimeter: get.number("external_perimeter_speed_mm_per_s"),
+            perimeter: get.number("perimeter_speed_mm_per_s"),
+            infill: get.number("infill_speed_mm_per_s"),
+            solid_infill: get.number("solid_infill_speed_mm_per_s"),
+            top_solid_infill: get.number("top_solid_infill_speed_mm_per_s"),
+            gap_fill: get.number("gap_fill_speed_mm_per_s"),
+            first_layer: get.number("first_layer_speed_mm_per_s"),
+            travel: get.number("travel_speed_mm_per_s"),
+        },
+        filament: FilamentParams {
+            area: std::f64::consts::FRAC_PI_4 * diameter * diameter,
+            multiplier: get.number("extrusion_multiplier"),
+            volume_per_second: get.number("max_volumetric_speed_mm3_per_s"),
+            retract_length: get.number("retract_length_mm"),
+            retract_speed: get.number("retract_speed_mm_per_s"),
+            retract_before_travel: get.number("retract_before_travel_mm"),
+            retract_lift: get.number("retract_lift_mm"),
+            wipe: get.number("wipe_mm"),
+        },
+        resample: ResampleParams {
+            chord: tolerances.chord_mm(),
+            travel_chord: get.number("travel_chord_mm"),
+            dialect,
+            azimuth: 0.0,
+        },
+        cooling: CoolingParams {
+            least_layer_time: get.number("slowdown_below_layer_time_s"),
+            least_speed: get.number("min_print_speed_mm_per_s"),
+        },
+        heat: HeatParams {
+            first_layer_temperature: get.number("first_layer_temperature_c"),
+            temperature: get.number("temperature_c"),
+            fan: get.number("fan_speed"),
+            layers_without_fan: get.count("disable_fan_first_layers"),
+        },
+    }
+}
+
+/// Values by name. A name that is not in the table, or of another kind, is a mistake of ours that
+/// the first test of every build finds.
+struct Lookup<'a>(&'a Settings);
+
+impl Lookup<'_> {
+    fn value(&self, name: &str) -> &Value {
+        self.0.get(Key::by_name(name).expect("names are in the table")).0
+    }
+
+    fn number(&self, name: &str) -> f64 {
+        match self.value(name) {
+            Value::Number(number) => *number,
+            other => unreachable!("{name} is a number, not {other}"),
+        }
+    }
+
+    fn count(&self, name: &str) -> usize {
+        match self.value(name) {
+            Value::Count(count) => usize::try_from(*count).expect("counts are not negative"),
+            other => unreachable!("{name} is a count, not {other}"),
+        }
+    }
+
+    fn switch(&self, name: &str) -> bool {
+        match self.value(name) {
+            Value::Switch(switch) => *switch,
+            other => unreachable!("{name} is a switch, not {other}"),
+        }
+    }
+
+    fn text(&self, name: &str) -> &str {
+        match self.value(name) {
+            Value::Text(text) => text,
+            other => unreachable!("{name} is a text, not {other}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn resolve(set: &[&str]) -> Result<Job, Failure> {
+        let mut settings = Settings::defaults();
+        for pair in set {
+            settings.set(pair)?;
+        }
+        Job::resolve(&settings)
+    }
+
+    #[test]
+    fn defaults_resolve() {
+        let job = resolve(&[]).unwrap();
+        assert_eq!(job.dialect.name, "polar");
+        assert!((job.printer.bed.speed - std::f64::consts::TAU).abs() < 1e-12);
+        assert_eq!(job.start[1], "M190 S60");
+    }
+
+    #[test]
+    fn values_that_do_not_fit_together_are_refused() {
+        let class = |set: &[&str]| resolve(set).unwrap_err().class();
+        assert_eq!(class(&["layer_height_mm=0.5"]), "ConfigRange");
+        assert_eq!(class(&["external_perimeter_extrusion_width_mm=0.1"]), "ConfigRange");
+        assert_eq!(class(&["chord_mm=0.001"]), "ConfigConflict");
+        assert_eq!(class(&["rail_min_mm=200"]), "ConfigConflict");
+        assert_eq!(class(&["home_z_mm=300"]), "ConfigConflict");
+        assert_eq!(class(&["start_gcode=M109 S{no}"]), "ConfigUnknownKey");
+        assert!(resolve(&["fill_density=100%"]).unwrap().paths.skins.all_solid);
+    }
+}

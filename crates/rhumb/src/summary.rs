@@ -1,0 +1,200 @@
+//! The closing words of a slice, as data and for people.
+
+use std::fmt::Write as _;
+
+use mesh::orient::{Rest, candidates};
+use nalgebra::{Point3, Rotation3, Vector3};
+use twin::verify::Verdict;
+
+use crate::check::findings;
+use crate::pipeline::{Outcome, part};
+use crate::place::volume;
+use crate::program_text::duration;
+use crate::report::{
+    Layers, MeshHealth, Model, Orientation, OrientationCandidate, Print, Report, Verify,
+};
+use crate::settings::Job;
+use machine::gcode::decimal;
+use machine::program::Role;
+
+/// Returns the report of a slice.
+#[must_use]
+pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Job) -> Report {
+    let (health, totals, part) = (&outcome.health, &outcome.totals, part(outcome));
+    let bounds = part.bounds();
+    let corner = |p: Point3<f64>| [p.x, p.y, p.z];
+    let skirt = Role::ALL
+        .iter()
+        .position(|role| *role == Role::SkirtBrim)
+        .map_or(0.0, |k| totals.volume[k]);
+    Report {
+        rhumb: env!("CARGO_PKG_VERSION"),
+        model: Model {
+            file: name.to_owned(),
+            triangles: health.facets,
+            volume_mm3: volume(part),
+            bounds_mm: [corner(bounds.min), corner(bounds.max)],
+        },
+        mesh: MeshHealth {
+            shells: health.shells,
+            open_edges: health.open_edges_left,
+            nonmanifold_edges: health.nonmanifold_edges,
+            flipped: health.flipped,
+            degenerate: health.degenerate,
+            duplicate: health.duplicate,
+            repairs: health.repairs().map(|note| note.code.to_owned()).collect(),
+        },
+        orientation: orientation(outcome, job),
+        layers: Layers {
+            kind: "planar",
+            count: outcome.levels.len(),
+            levels_mm: outcome.levels.iter().map(|level| tidy(level.upper)).collect(),
+            heights_mm: outcome.levels.iter().map(|level| tidy(level.thickness())).collect(),
+            flats: Vec::new(),
+            lost_mm2: outcome.lost.area,
+        },
+        print: Print {
+            time_s: totals.time,
+            filament_mm: totals.filament,
+            filament_g: totals.filament * job.plan.filament.area * job.density_g_per_mm3,
+            extruded_mm3: totals.extruded(),
+            part_mm3: totals.extruded() - skirt,
+            travel_mm: totals.travel,
+            moves: totals.moves,
+            retractions: totals.retractions,
+            bed_turns: totals.bed_turns,
+        },
+        verify: Verify { findings: verdict.map(findings).unwrap_or_default() },
+        timings_ms: outcome.timings.clone(),
+        warnings: outcome.warnings.clone(),
+    }
+}
+
+/// A level without the noise of its last bits.
+fn tidy(length: f64) -> f64 {
+    (length * 1e6).round() / 1e6
+}
+
+fn orientation(outcome: &Outcome, job: &Job) -> Orientation {
+    let rotation: &Rotation3<f64> = &outcome.placed.placement.rotation;
+    let row = |i: usize| [rotation[(i, 0)], rotation[(i, 1)], rotation[(i, 2)]];
+    let direction = |v: Vector3<f64>| [v.x, v.y, v.z];
+    // Directions of the part, turned back to those of the model.
+    let ranked = candidates(part(outcome), &job.orient);
+    Orientation {
+        part_from_model: [row(0), row(1), row(2)],
+        normal_model: direction(rotation.inverse() * -Vector3::z()),
+        area_mm2: match outcome.placed.rest {
+            Some(Rest::Flat(best)) => best.class_area_mm2,
+            _ => 0.0,
+        },
+        candidates: ranked
+            .iter()
+            .map(|candidate| OrientationCandidate {
+                normal_model: direction(rotation.inverse() * candidate.down),
+                area_mm2: candidate.class_area_mm2,
+                bed_area_mm2: candidate.bed_area_mm2,
+                height_mm: candidate.height_mm,
+            })
+            .collect(),
+    }
+}
+
+/// Returns the closing summary.
+#[must_use]
+pub fn text(
+    report: &Report,
+    outcome: &Outcome,
+    verdict: Option<&Verdict>,
+    job: &Job,
+    target: &str,
+    verbose: bool,
+) -> String {
+    let mut out = String::new();
+    let size = part(outcome).bounds().size();
+    let mut row = |label: &str, text: String| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(out, "{label:>10}  {text}");
+    };
+    row(
+        "part",
+        format!(
+            "{} x {} x {} mm, {} mm³, {}",
+            decimal(size.x, 2),
+            decimal(size.y, 2),
+            decimal(size.z, 2),
+            decimal(report.model.volume_mm3, 1),
+            resting(outcome)
+        ),
+    );
+    row("layers", format!("{} of {} mm", report.layers.count, heights(job)));
+    row("time", duration(report.print.time_s));
+    row(
+        "filament",
+        format!(
+            "{} m, {} g",
+            decimal(report.print.filament_mm / 1000.0, 2),
+            decimal(report.print.filament_g, 1)
+        ),
+    );
+    row("bed", format!("{} turns", decimal(report.print.bed_turns, 0)));
+    for warning in &report.warnings {
+        row("note", format!("{} [{}]", warning.message, warning.code));
+    }
+    match verdict {
+        None => row("check", "left out on request".into()),
+        Some(verdict) if verdict.findings.is_empty() => row(
+            "check",
+            format!(
+                "{} moves read back and replayed: nothing to complain of",
+                verdict.totals.moves
+            ),
+        ),
+        Some(verdict) => {
+            for finding in &verdict.findings {
+                row("check", finding.to_string());
+            }
+            for omitted in &verdict.omitted {
+                row("check", omitted.to_string());
+            }
+        }
+    }
+    if verbose {
+        let t = &report.timings_ms;
+        row(
+            "ms",
+            format!(
+                "read {:.0}, repair {:.0}, orient {:.0}, slice {:.0}, verify {:.0}, total {:.0}",
+                t.read, t.repair, t.orient, t.slice, t.verify, t.total
+            ),
+        );
+    }
+    row("written", target.to_owned());
+    out
+}
+
+fn heights(job: &Job) -> String {
+    let schedule = &job.schedule;
+    if schedule.first_layer_height == schedule.layer_height {
+        decimal(schedule.layer_height, 3)
+    } else {
+        format!(
+            "{} (the first {})",
+            decimal(schedule.layer_height, 3),
+            decimal(schedule.first_layer_height, 3)
+        )
+    }
+}
+
+fn resting(outcome: &Outcome) -> String {
+    match outcome.placed.rest {
+        None => "in the pose that was asked for".into(),
+        Some(Rest::Flat(best)) => {
+            format!("resting on {} mm²", decimal(best.bed_area_mm2, 1))
+        }
+        Some(Rest::Kept { largest_share }) => format!(
+            "as in the file: the largest flat face has only {} % of its surface",
+            decimal(largest_share * 100.0, 1)
+        ),
+    }
+}

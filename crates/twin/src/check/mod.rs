@@ -1,0 +1,20 @@
+//! The checks, one concept each.
+//!
+//! A check has a `NAME`, under which its findings appear, and is shown every segment, layer or
+//! temperature of a program in order. It keeps a few numbers, never the program. What it measures
+//! is compared with the printer's profile after allowing for [rounding](crate::rounding); a value
+//! that is not a number is always a finding.
+//!
+//! On the text: [`text`], [`modes`]. On the machine: [`reach`], [`axis`], [`speed`],
+//! [`acceleration`], [`heat`]. On the part: [`continuity`], [`volume`], [`deposit`].
+
+pub mod acceleration;
+pub mod axis;
+pub mod continuity;
+pub mod deposit;
+pub mod heat;
+pub mod modes;
+pub mod reach;
+pub mod speed;
+pub mod text;
+pub mod volume;

@@ -1,0 +1,335 @@
+//! Is as much material laid as the part holds, and no more?
+//!
+//! What a layer holds is the area of the mesh's section at the middle of the layer times its
+//! height; what is laid is filament times its cross-section. Skirt, brim, priming and supports
+//! (`Custom`) are not the part's.
+//!
+//! * A layer may hold more than its section by [`LAYER_SHARE`] of it, plus [`BORDER`] times its
+//!   outline, plus one bead's dot.
+//! * The print may hold more than its sections together by [`PRINT_SHARE`], plus the border.
+//! * A print that is meant to be solid may hold less by [`PRINT_SHARE`], plus the border, plus
+//!   the edges of its outermost beads: a bead's side is a half circle, which leaves
+//!   `h²·(1 − π/4)/2` of the outline's square corner empty.
+//!
+//! Where the nozzle leaves the plane of its layer, layers cannot be told by a plane section; then
+//! only the print as a whole is compared, with the volume that the mesh encloses. Shells that
+//! overlap are counted as often as they do (see [`crate::section`]).
+//!
+//! mm, mm², mm³. Part frame.
+
+use std::f64::consts::FRAC_PI_4;
+
+use machine::program::Role;
+
+use crate::finding::{Findings, Place, exceeds};
+use crate::replay::LayerMark;
+use crate::rounding;
+use crate::section::Section;
+use crate::segment::Segment;
+
+/// The name of this check.
+pub const NAME: &str = "volume";
+
+/// How much more than its section a layer may hold, as a share. Fill that is anchored in the walls
+/// overlaps them by a fraction of a bead, which is 2 % of a section of 20 mm and 4 % of one of
+/// 10 mm; beads laid twice are 100 %.
+pub const LAYER_SHARE: f64 = 0.05;
+
+/// How much more or less than its sections a print may hold, as a share: what rhumb promises.
+pub const PRINT_SHARE: f64 = 0.02;
+
+/// How far the laid outline may lie beyond the section's, mm: chord (0.005), simplification
+/// (0.002), the last places (0.001), and room for what they do together.
+pub const BORDER: f64 = 0.01;
+
+/// What one layer holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LayerVolume {
+    /// Its number.
+    pub index: usize,
+    /// The line where it begins.
+    pub line: usize,
+    /// Highest place of the nozzle so far, mm, when announced.
+    pub top: Option<f64>,
+    /// Its thickness, mm, when announced.
+    pub height: Option<f64>,
+    /// Material laid for the part, mm³.
+    pub part: f64,
+    /// Material laid for anything else, mm³.
+    pub other: f64,
+    /// The area of the mesh at its middle, mm², when there is a mesh.
+    pub area: Option<f64>,
+    /// The length of the outline there, mm; zero without a mesh.
+    pub outline: f64,
+    /// Whether the nozzle stayed in one plane while it laid the part.
+    pub is_plane: bool,
+}
+
+/// Sums material by layer and role, and compares it with the mesh.
+#[derive(Debug, Clone)]
+pub(crate) struct Volume {
+    filament_area: f64,
+    nozzle: f64,
+    layers: Vec<LayerVolume>,
+    /// Filament by role, in the order of [`Role::ALL`], mm.
+    by_role: [f64; Role::ALL.len()],
+    filament: f64,
+}
+
+impl Volume {
+    /// Returns the check for filament of this cross-section (mm²) and a nozzle of this bore (mm).
+    #[must_use]
+    pub(crate) fn new(filament_area: f64, nozzle: f64) -> Self {
+        let by_role = [0.0; Role::ALL.len()];
+        Self { filament_area, nozzle, layers: Vec::new(), by_role, filament: 0.0 }
+    }
+
+    pub(crate) fn segment(&mut self, segment: &Segment) {
+        self.filament += segment.filament;
+        if !segment.extrudes() {
+            return;
+        }
+        self.by_role[role_index(segment.role)] += segment.filament;
+        let Some(layer) = self.layers.last_mut() else { return };
+        let volume = segment.filament * self.filament_area;
+        if is_part(segment.role) {
+            layer.part += volume;
+            let in_plane =
+                |z: f64| layer.top.is_some_and(|top| (z - top).abs() <= rounding::IN_PLANE);
+            layer.is_plane &= in_plane(segment.part[0].z) && in_plane(segment.part[1].z);
+        } else {
+            layer.other += volume;
+        }
+    }
+
+    /// Begins a layer, with the section at its middle when there is a mesh.
+    pub(crate) fn layer(&mut self, mark: LayerMark, section: Option<&Section>) {
+        self.layers.push(LayerVolume {
+            index: mark.index,
+            line: mark.line,
+            top: mark.top,
+            height: mark.height,
+            part: 0.0,
+            other: 0.0,
+            area: section.map(Section::area),
+            outline: section.map_or(0.0, Section::perimeter),
+            is_plane: true,
+        });
+    }
+
+    /// Returns what each layer holds.
+    #[must_use]
+    pub(crate) fn layers(&self) -> &[LayerVolume] {
+        &self.layers
+    }
+
+    /// Returns the filament fed in all, less what was drawn back, mm.
+    #[must_use]
+    pub(crate) fn filament(&self) -> f64 {
+        self.filament
+    }
+
+    /// Returns the material laid for each role, mm³.
+    #[must_use]
+    pub(crate) fn by_role(&self) -> [(Role, f64); Role::ALL.len()] {
+        Role::ALL.map(|role| (role, self.by_role[role_index(role)] * self.filament_area))
+    }
+
+    /// Compares with the mesh, whose enclosed volume is `enclosed`; `is_solid` when the print is
+    /// meant to be. Returns what could not be judged.
+    pub(crate) fn end(
+        &self,
+        enclosed: Option<f64>,
+        is_solid: bool,
+        findings: &mut Findings,
+    ) -> Option<&'static str> {
+        let Some(enclosed) = enclosed else {
+            return Some("volume: without a mesh, material is summed and not compared");
+        };
+        let Some(last) = self.layers.last() else {
+            return Some("volume: no layers are announced, material is not compared");
+        };
+        let place = Place::line(last.line, Some(last.index));
+        let flat: Option<Vec<Bill>> = self.layers.iter().map(Bill::of).collect();
+        let laid: f64 = self.layers.iter().map(|layer| layer.part).sum();
+        let (bill, note) = if let Some(layers) = flat {
+            for (layer, bill) in self.layers.iter().zip(&layers) {
+                self.overfilled(layer, bill, findings);
+            }
+            (layers.iter().fold(Bill::default(), Bill::plus), None)
+        } else {
+            let note = "volume: layers are curved or lack ;Z: or ;HEIGHT:, only the whole print \
+                        is compared";
+            (Bill { section: enclosed, ..self.borders() }, Some(note))
+        };
+        whole(laid, &bill, is_solid, place, findings);
+        note
+    }
+
+    fn overfilled(&self, layer: &LayerVolume, bill: &Bill, findings: &mut Findings) {
+        let dot = self.nozzle * self.nozzle * layer.height.unwrap_or(0.0);
+        let limit = bill.section * (1.0 + LAYER_SHARE) + bill.border + dot;
+        if exceeds(layer.part, limit) {
+            let (laid, holds) = (layer.part, bill.section);
+            let place = Place::line(layer.line, Some(layer.index));
+            findings.error(NAME, place, (laid, limit), || {
+                format!(
+                    "the layer gets {laid:.3} mm³, its section holds {holds:.3} mm³ and may get \
+                     {limit:.3} mm³"
+                )
+            });
+        }
+    }
+
+    /// The allowances for borders, where sections do not count.
+    fn borders(&self) -> Bill {
+        let bills = self.layers.iter().map(|layer| {
+            let height = layer.height.unwrap_or(0.0);
+            Bill { section: 0.0, ..Bill::for_outline(layer.outline, height) }
+        });
+        bills.fold(Bill::default(), |sum, bill| sum.plus(&bill))
+    }
+}
+
+/// What a layer, or a print, should hold.
+#[derive(Debug, Clone, Copy, Default)]
+struct Bill {
+    section: f64,
+    border: f64,
+    /// What the round sides of the outermost beads leave empty.
+    edges: f64,
+}
+
+impl Bill {
+    /// `None` where a plane section says nothing.
+    fn of(layer: &LayerVolume) -> Option<Self> {
+        let (height, area) = (layer.height?, layer.area?);
+        let borders = Self::for_outline(layer.outline, height);
+        layer.is_plane.then_some(Self { section: area * height, ..borders })
+    }
+
+    fn for_outline(outline: f64, height: f64) -> Self {
+        let edges = outline * height * height * (1.0 - FRAC_PI_4) / 2.0;
+        Self { section: 0.0, border: outline * height * BORDER, edges }
+    }
+
+    fn plus(self, other: &Self) -> Self {
+        Self {
+            section: self.section + other.section,
+            border: self.border + other.border,
+            edges: self.edges + other.edges,
+        }
+    }
+}
+
+fn whole(laid: f64, bill: &Bill, is_solid: bool, place: Place, findings: &mut Findings) {
+    let holds = bill.section;
+    let most = holds * (1.0 + PRINT_SHARE) + bill.border;
+    if exceeds(laid, most) {
+        findings.error(NAME, place, (laid, most), || {
+            format!(
+                "the print gets {laid:.2} mm³, the mesh holds {holds:.2} mm³, at most {most:.2} mm³"
+            )
+        });
+    }
+    let least = holds * (1.0 - PRINT_SHARE) - bill.border - bill.edges;
+    if is_solid && exceeds(least, laid) {
+        findings.error(NAME, place, (laid, least), || {
+            format!(
+                "the solid print gets {laid:.2} mm³, the mesh holds {holds:.2} mm³, at least \
+                 {least:.2} mm³"
+            )
+        });
+    }
+}
+
+fn is_part(role: Role) -> bool {
+    !matches!(role, Role::SkirtBrim | Role::Custom)
+}
+
+fn role_index(role: Role) -> usize {
+    Role::ALL.iter().position(|&known| known == role).unwrap_or(Role::ALL.len() - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::{joints, polar_segment, segment};
+    use crate::section::tests::block;
+    use crate::section::{self, Sweep};
+
+    const HEIGHT: f64 = 0.2;
+
+    fn section_at(z: f64) -> Section {
+        let mut section = Section::default();
+        Sweep::new(&block(10.0, 0.0, 1.0, 0.0)).cut(z, &mut section);
+        section
+    }
+
+    /// Five layers of a block of 400 mm² and 1 mm, each filled to a share of what it holds.
+    fn found(shares: [f64; 5], role: Role, is_solid: bool) -> Vec<usize> {
+        let mut check = Volume::new(2.0, 0.4);
+        for (index, share) in shares.into_iter().enumerate() {
+            let top = HEIGHT * (index + 1) as f64;
+            let (top_mark, height) = (Some(top), Some(HEIGHT));
+            let mark = LayerMark { line: index + 1, index, top: top_mark, height };
+            check.layer(mark, Some(&section_at(top - HEIGHT / 2.0)));
+            let mut line = segment(joints(5.0, 0.0, top), joints(9.0, 1.0, top), 20.0);
+            (line.filament, line.role) = (share * 400.0 * HEIGHT / 2.0, role);
+            check.segment(&line);
+        }
+        let mut findings = Findings::default();
+        assert_eq!(check.end(Some(400.0), is_solid, &mut findings), None);
+        findings.kept().iter().map(|finding| finding.line).collect()
+    }
+
+    #[test]
+    fn sections_are_filled_and_not_more() {
+        assert_eq!(found([1.0, 1.02, 0.97, 1.0, 1.0], Role::SolidInfill, true), []);
+        assert_eq!(found([0.2; 5], Role::InternalInfill, false), []);
+        assert_eq!(found([0.9, 0.9, 1.2, 0.9, 0.9], Role::Perimeter, false), [3]);
+        assert_eq!(found([1.04; 5], Role::Perimeter, false), [5]);
+        assert_eq!(found([0.965; 5], Role::SolidInfill, true), [5]);
+        assert_eq!(found([0.965; 5], Role::SolidInfill, false), []);
+        assert_eq!(found([3.0; 5], Role::SkirtBrim, false), []);
+    }
+
+    #[test]
+    fn roles_and_layers_are_summed_exactly() {
+        let mut check = Volume::new(2.0, 0.4);
+        let mut line = polar_segment([5.0, 0.0], [9.0, 1.0], 20.0);
+        line.filament = 0.5;
+        line.role = Role::Custom;
+        check.segment(&line);
+        let mark = LayerMark { line: 1, index: 0, top: Some(0.2), height: None };
+        check.layer(mark, None);
+        line.role = Role::Perimeter;
+        check.segment(&line);
+        line.filament = -0.25;
+        check.segment(&line);
+        assert_eq!(check.filament(), 0.75);
+        assert_eq!(check.layers()[0].part, 1.0);
+        let by_role = check.by_role();
+        let of = |role| by_role.iter().find(|(known, _)| *known == role).unwrap().1;
+        assert_eq!((of(Role::Perimeter), of(Role::Custom), of(Role::GapFill)), (1.0, 1.0, 0.0));
+    }
+
+    #[test]
+    fn what_cannot_be_judged_is_said() {
+        let mut findings = Findings::default();
+        let mut check = Volume::new(2.0, 0.4);
+        assert!(check.end(None, true, &mut findings).unwrap().contains("without a mesh"));
+        assert!(check.end(Some(1.0), true, &mut findings).unwrap().contains("no layers"));
+        let mark = LayerMark { line: 4, index: 0, top: Some(1.0), height: Some(1.0) };
+        check.layer(mark, Some(&section_at(0.5)));
+        let mut rising = segment(joints(5.0, 0.0, 0.5), joints(9.0, 1.0, 1.0), 20.0);
+        rising.filament = 200.0;
+        check.segment(&rising);
+        let mesh = section::volume(&block(10.0, 0.0, 1.0, 0.0));
+        assert!(check.end(Some(mesh), true, &mut findings).unwrap().contains("curved"));
+        assert!(findings.checks().is_empty());
+        check.segment(&rising);
+        check.end(Some(mesh), true, &mut findings);
+        assert_eq!(findings.checks(), [NAME]);
+    }
+}

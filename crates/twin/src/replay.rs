@@ -1,0 +1,367 @@
+//! Lines of a program become segments.
+//!
+//! One line in, at most one [`Event`] out; nothing is remembered but where the machine stands and
+//! what was announced, so memory does not grow with the program. Positions in joints go through
+//! the printer's *forward* kinematics; its inverse is never asked.
+//!
+//! `F` is the speed of the nozzle over the part in mm/min, so a move takes the length of its
+//! [curve](crate::curve) divided by it; where only filament moves `F` is the speed of the
+//! filament. `F`, the plane and `Z` hold until they are given again; `E` is relative. Words are
+//! read as in absolute positions (`G90`) and relative filament (`M83`) whatever was commanded:
+//! that it was commanded is for [`crate::check::modes`]. `G28` brings the machine to the
+//! printer's home.
+
+use machine::gcode::dialect::{Dialect, Quantity, Space};
+use machine::gcode::{Command, Line, SyntaxError, parse_line};
+use machine::kinematics::Alignment;
+use machine::profile::Printer;
+use machine::program::{BedTurn, Feed, Joints, Role};
+use nalgebra::Point3;
+
+use crate::curve::Curve;
+use crate::segment::Segment;
+
+/// What a line makes happen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Event {
+    /// Nothing that a check looks at.
+    Nothing,
+    /// The axes or the filament move.
+    Segment(Segment),
+    /// A layer begins.
+    Layer(LayerMark),
+    /// The machine stands still until something is done: homing, a dwell, a wait for heat.
+    Rest,
+    /// The nozzle is to have a temperature.
+    Nozzle(Heating),
+    /// The bed is to have a temperature.
+    Bed(Heating),
+}
+
+/// A layer as the comments announce it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LayerMark {
+    /// The line of its number.
+    pub line: usize,
+    /// Its number.
+    pub index: usize,
+    /// The highest place of the nozzle so far, mm, when it was announced.
+    pub top: Option<f64>,
+    /// Its thickness, mm, when it was announced.
+    pub height: Option<f64>,
+}
+
+/// A temperature commanded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Heating {
+    /// °C; 0 is off.
+    pub target: f64,
+    /// Whether the program waits until it is reached.
+    pub waits: bool,
+}
+
+/// Where the machine stands.
+#[derive(Debug, Clone, Copy)]
+struct Stand {
+    /// The plane's words, in their own units.
+    plane: [f64; 2],
+    z: f64,
+    joints: Option<Joints>,
+    part: Point3<f64>,
+}
+
+/// Reads a program line by line. See the [module](self).
+#[derive(Debug, Clone)]
+pub struct Replay {
+    alignment: Alignment,
+    home: Joints,
+    dialect: Dialect,
+    line: usize,
+    stand: Stand,
+    feed: Feed,
+    layer: Option<usize>,
+    top: Option<f64>,
+    height: Option<f64>,
+    role: Role,
+    width: f64,
+}
+
+impl Replay {
+    /// Returns a replay that stands at the printer's home, before the first line.
+    #[must_use]
+    pub fn new(printer: &Printer, dialect: Dialect) -> Self {
+        Self {
+            alignment: printer.alignment,
+            home: printer.home,
+            dialect,
+            line: 0,
+            stand: Stand::at_home(&printer.home, &dialect, &printer.alignment),
+            feed: Feed::mm_per_s(0.0),
+            layer: None,
+            top: None,
+            height: None,
+            role: Role::Custom,
+            width: 0.0,
+        }
+    }
+
+    /// Reads the next line.
+    ///
+    /// # Errors
+    ///
+    /// [`SyntaxError`] when it is not a command; the machine stays where it is.
+    pub fn line(&mut self, text: &str) -> Result<Event, SyntaxError> {
+        match read(text) {
+            Ok(line) => Ok(self.follow(&line)),
+            Err(error) => {
+                self.line += 1;
+                Err(error)
+            }
+        }
+    }
+
+    /// Follows the next line, taken apart before by [`read`].
+    pub fn follow(&mut self, line: &Line<'_>) -> Event {
+        self.line += 1;
+        match (&line.command, line.comment) {
+            (Some(command), _) => self.command(command),
+            (None, Some(comment)) => self.comment(comment),
+            (None, None) => Event::Nothing,
+        }
+    }
+
+    /// Counts a line that could not be read.
+    pub(crate) fn skip(&mut self) {
+        self.line += 1;
+    }
+
+    /// Returns the number of lines read.
+    #[must_use]
+    pub fn lines(&self) -> usize {
+        self.line
+    }
+
+    /// Returns the layer announced last.
+    #[must_use]
+    pub fn layer(&self) -> Option<usize> {
+        self.layer
+    }
+
+    fn command(&mut self, command: &Command<'_>) -> Event {
+        use machine::gcode::Code::Numbered;
+        match command.code {
+            Numbered(b'G', 0..=3, 0) => self.motion(command).map_or(Event::Nothing, Event::Segment),
+            Numbered(b'G', 28, 0) => {
+                self.stand = Stand::at_home(&self.home, &self.dialect, &self.alignment);
+                Event::Rest
+            }
+            Numbered(b'G', 4, 0) | Numbered(b'M', 400, 0) => Event::Rest,
+            Numbered(b'M', 104 | 109, 0) => {
+                heating(command, 109).map_or(Event::Nothing, Event::Nozzle)
+            }
+            Numbered(b'M', 140 | 190, 0) => {
+                heating(command, 190).map_or(Event::Nothing, Event::Bed)
+            }
+            _ => Event::Nothing,
+        }
+    }
+
+    fn motion(&mut self, command: &Command<'_>) -> Option<Segment> {
+        if let Some(feed) = command.word(b'F').filter(|feed| *feed > 0.0) {
+            self.feed = Feed::from_word(feed);
+        }
+        let words = self.dialect.plane.map(|word| command.word(word.letter));
+        let (z, filament) = (command.word(b'Z'), command.word(b'E'));
+        let from = self.stand;
+        let moves = words[0].is_some() || words[1].is_some() || z.is_some();
+        if moves {
+            let plane = [0, 1].map(|k| words[k].unwrap_or(from.plane[k]));
+            self.stand = Stand::at(plane, z.unwrap_or(from.z), &self.dialect, &self.alignment);
+        }
+        (moves || filament.is_some()).then(|| self.segment(&from, filament.unwrap_or(0.0)))
+    }
+
+    fn segment(&self, from: &Stand, filament: f64) -> Segment {
+        let to = &self.stand;
+        let joints = from.joints.zip(to.joints).map(|(from, to)| [from, to]);
+        let curve = match &joints {
+            Some([from, to]) => Curve::between_joints(from, to, &self.alignment),
+            None => Curve::between_points(&from.part, &to.part, &self.alignment),
+        };
+        let path = curve.length();
+        let distance = if path > 0.0 { path } else { filament.abs() };
+        let speed = self.feed.in_mm_per_s();
+        Segment {
+            line: self.line,
+            layer: self.layer,
+            role: self.role,
+            width: self.width,
+            joints,
+            part: [from.part, to.part],
+            nearest: curve.nearest_to_axis(),
+            curve,
+            path,
+            filament,
+            feed: self.feed,
+            duration: if speed > 0.0 { distance / speed } else { 0.0 },
+        }
+    }
+
+    fn comment(&mut self, comment: &str) -> Event {
+        if let Some(label) = comment.strip_prefix("TYPE:") {
+            self.role = role_of(label);
+        } else if let Some(width) = comment.strip_prefix("WIDTH:") {
+            self.width = number(width).unwrap_or(self.width);
+        } else if comment == "LAYER_CHANGE" {
+            (self.top, self.height) = (None, None);
+        } else if let Some(top) = comment.strip_prefix("Z:") {
+            self.top = number(top);
+        } else if let Some(height) = comment.strip_prefix("HEIGHT:") {
+            self.height = number(height);
+        } else if let Some(index) = comment.strip_prefix("LAYER:").and_then(|n| n.parse().ok()) {
+            self.layer = Some(index);
+            let Self { line, top, height, .. } = *self;
+            return Event::Layer(LayerMark { line, index, top, height });
+        }
+        Event::Nothing
+    }
+}
+
+impl Stand {
+    fn at_home(home: &Joints, dialect: &Dialect, alignment: &Alignment) -> Self {
+        let part = alignment.part_from_joints(home);
+        let plane = dialect.plane.map(|word| match word.quantity {
+            Quantity::Rail => home.s,
+            Quantity::Bed => home.turn.radians().to_degrees(),
+            Quantity::PartX => part.x,
+            Quantity::PartY => part.y,
+        });
+        let joints = (dialect.space == Space::Joints).then_some(*home);
+        Self { plane, z: home.z, joints, part }
+    }
+
+    fn at(plane: [f64; 2], z: f64, dialect: &Dialect, alignment: &Alignment) -> Self {
+        let mut joints = Joints { s: 0.0, turn: BedTurn::default(), z };
+        let mut part = Point3::new(0.0, 0.0, z);
+        for (word, value) in dialect.plane.iter().zip(plane) {
+            match word.quantity {
+                Quantity::Rail => joints.s = value,
+                Quantity::Bed => joints.turn = BedTurn::accumulated(value.to_radians()),
+                Quantity::PartX => part.x = value,
+                Quantity::PartY => part.y = value,
+            }
+        }
+        match dialect.space {
+            Space::Joints => {
+                let part = alignment.part_from_joints(&joints);
+                Self { plane, z, joints: Some(joints), part }
+            }
+            Space::Part => Self { plane, z, joints: None, part },
+        }
+    }
+}
+
+/// Takes a line apart. The text of a message (`M117`) is not words.
+///
+/// # Errors
+///
+/// [`SyntaxError`] with the column of the first character that does not fit.
+pub fn read(text: &str) -> Result<Line<'_>, SyntaxError> {
+    match text.strip_prefix("M117") {
+        Some(message) if message.is_empty() || message.starts_with(' ') => parse_line("M117"),
+        _ => parse_line(text),
+    }
+}
+
+fn heating(command: &Command<'_>, waiting: u32) -> Option<Heating> {
+    let target = command.word(b'S').or(command.word(b'R'))?;
+    Some(Heating { target, waits: command.is(b'M', waiting) })
+}
+
+/// The role with this label. Labels that other programs write, and the machine crate does not
+/// know, count as what they are nearest to; support counts as no part of the part.
+fn role_of(label: &str) -> Role {
+    Role::from_label(label).unwrap_or(match label {
+        "Overhang perimeter" => Role::Perimeter,
+        "Bridge infill" => Role::SolidInfill,
+        _ => Role::Custom,
+    })
+}
+
+fn number(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::printer;
+    use crate::segment::Kind;
+    use machine::gcode::dialect::{CARTESIAN, POLAR};
+
+    fn segments(dialect: Dialect, text: &str) -> Vec<Segment> {
+        let mut replay = Replay::new(&printer(), dialect);
+        text.lines()
+            .filter_map(|line| match replay.line(line).unwrap() {
+                Event::Segment(segment) => Some(segment),
+                _ => None,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_short_polar_program() {
+        let read = segments(
+            POLAR,
+            "G28\nG90\nM83\n;LAYER_CHANGE\n;Z:0.2\n;HEIGHT:0.2\n;LAYER:0\n;TYPE:Perimeter\n\
+             ;WIDTH:0.45\nG1 R20 T0 Z0.2 F6000\nG1 E0.8 F600\nG1 R20 T90 E0.5 F1200\nG1 E-0.8\n\
+             G1 Z1.2\nG1 F900\nG1 R20 T90\n",
+        );
+        let kinds: Vec<Kind> = read.iter().map(Segment::kind).collect();
+        use Kind::{Extrusion, Prime, Retraction, Still, Travel};
+        assert_eq!(kinds, [Travel, Prime, Extrusion, Retraction, Travel, Still]);
+        assert_eq!(read[0].line, 10);
+        assert_eq!((read[2].layer, read[2].role, read[2].width), (Some(0), Role::Perimeter, 0.45));
+        let quarter = std::f64::consts::FRAC_PI_2;
+        assert!((read[2].path - 20.0 * quarter).abs() < 1e-12);
+        assert!((read[2].duration - quarter).abs() < 1e-12);
+        assert!((read[2].part[1] - Point3::new(0.0, 20.0, 0.2)).norm() < 1e-12);
+        assert!((read[3].duration - 0.8 / 20.0).abs() < 1e-12);
+        assert_eq!((read[4].path, read[4].duration), (1.0, 0.05));
+    }
+
+    #[test]
+    fn part_coordinates_run_straight() {
+        let read = segments(CARTESIAN, "G28\nG1 X30 Y0 Z0 F600\nG1 X0 Y40 E1\n");
+        assert_eq!(read[0].part[0], Point3::new(100.0, 0.0, 20.0));
+        assert_eq!((read[1].path, read[1].joints), (50.0, None));
+        assert_eq!(read[1].nearest, 24.0);
+        assert_eq!(read[1].duration, 5.0);
+    }
+
+    #[test]
+    fn events_other_than_motion() {
+        let mut replay = Replay::new(&printer(), POLAR);
+        let on = |target, waits| Heating { target, waits };
+        assert_eq!(replay.line("M104 S210"), Ok(Event::Nozzle(on(210.0, false))));
+        assert_eq!(replay.line("M190 S60"), Ok(Event::Bed(on(60.0, true))));
+        assert_eq!(replay.line("M117 Layer 3: R12 T"), Ok(Event::Nothing));
+        assert_eq!(replay.line("G28"), Ok(Event::Rest));
+        assert_eq!(replay.line(";Z:0.4"), Ok(Event::Nothing));
+        let mark = LayerMark { line: 6, index: 7, top: Some(0.4), height: None };
+        assert_eq!(replay.line(";LAYER:7"), Ok(Event::Layer(mark)));
+        assert!(replay.line("G1 R").is_err());
+        assert_eq!((replay.lines(), replay.layer()), (7, Some(7)));
+    }
+
+    #[test]
+    fn a_misaligned_machine_is_where_its_kinematics_says() {
+        let mut printer = printer();
+        printer.alignment = Alignment { a: 0.2, b: 0.35, ..Alignment::default() };
+        let mut replay = Replay::new(&printer, POLAR);
+        let Ok(Event::Segment(segment)) = replay.line("G1 R10 T30 Z1 F600") else { panic!() };
+        let joints = segment.joints.unwrap()[1];
+        assert_eq!(segment.part[1], printer.alignment.part_from_joints(&joints));
+        assert!((segment.curve.radius(1.0) - 10.2_f64.hypot(0.35)).abs() < 1e-12);
+    }
+}

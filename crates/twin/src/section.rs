@@ -1,0 +1,288 @@
+//! Plane cuts of a mesh, straight from the facets.
+//!
+//! A facet that has corners on both sides of `z = c` gives one directed piece of the outline, from
+//! the side that comes down through the plane to the side that goes up, so that the inside lies on
+//! its left seen from above. Pieces are never chained: area is the sum of their cross products,
+//! length the sum of their lengths, and a place is inside when the pieces wind round it. A corner
+//! at exactly `c` counts as above, so a closed mesh always gives closed outlines. Part frame, mm.
+//!
+//! Limits. The area of shells that overlap is counted as often as they do, holes of an open mesh
+//! leave it undefined; facets that are not finite or name no vertex are left out.
+//!
+//! Layers come from below upwards, so a sweep over facets sorted by height finds those of one
+//! plane in time proportional to what it cuts.
+
+use mesh::mesh::Mesh;
+use nalgebra::{Point2, Point3, Vector2};
+
+/// One directed piece of an outline, mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Piece {
+    /// Where it starts.
+    pub from: Point2<f64>,
+    /// Where it ends; the inside is on the left.
+    pub to: Point2<f64>,
+}
+
+/// What a plane cuts from a mesh.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Section {
+    /// The outline, in no order.
+    pub pieces: Vec<Piece>,
+}
+
+/// Cuts a mesh by planes, best from below upwards.
+#[derive(Debug)]
+pub struct Sweep<'a> {
+    mesh: &'a Mesh,
+    /// Facets with their extent in z, by their least z.
+    facets: Vec<Facet>,
+    /// The first facet that has not begun at the last plane.
+    next: usize,
+    /// Facets that had begun and not ended at the last plane, as indices of `facets`.
+    active: Vec<u32>,
+    last: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Facet {
+    least: f64,
+    most: f64,
+    triangle: u32,
+}
+
+impl<'a> Sweep<'a> {
+    /// Prepares to cut `mesh`.
+    #[must_use]
+    pub fn new(mesh: &'a Mesh) -> Self {
+        let mut facets: Vec<Facet> = (0_u32..)
+            .zip(&mesh.triangles)
+            .filter_map(|(triangle, corners)| {
+                let z = corners_of(mesh, corners)?.map(|p| p.z);
+                let (least, most) = (z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]));
+                Some(Facet { least, most, triangle })
+            })
+            .collect();
+        facets
+            .sort_unstable_by(|a, b| a.least.total_cmp(&b.least).then(a.triangle.cmp(&b.triangle)));
+        Self { mesh, facets, next: 0, active: Vec::new(), last: f64::NEG_INFINITY }
+    }
+
+    /// Cuts at height `z`, replacing what `section` held.
+    pub fn cut(&mut self, z: f64, section: &mut Section) {
+        section.pieces.clear();
+        if z < self.last || z.is_nan() || self.last.is_nan() {
+            (self.next, self.last) = (0, f64::NEG_INFINITY);
+            self.active.clear();
+        }
+        self.last = z;
+        while self.facets.get(self.next).is_some_and(|facet| facet.least < z) {
+            self.active.push(self.next as u32);
+            self.next += 1;
+        }
+        let (facets, mesh) = (&self.facets, self.mesh);
+        self.active.retain(|&facet| facets[facet as usize].most >= z);
+        let cut = |&facet: &u32| {
+            let corners = mesh.triangles.get(facets[facet as usize].triangle as usize)?;
+            piece(&corners_of(mesh, corners)?, z)
+        };
+        section.pieces.extend(self.active.iter().filter_map(cut));
+    }
+}
+
+impl Section {
+    /// Returns the area, mm².
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        // Near the outline products are small, so differences lose no digits.
+        let Some(first) = self.pieces.first() else { return 0.0 };
+        let origin = first.from;
+        let twice: f64 = self.pieces.iter().map(|p| (p.from - origin).perp(&(p.to - origin))).sum();
+        0.5 * twice
+    }
+
+    /// Returns the length of the outline, mm.
+    #[must_use]
+    pub fn perimeter(&self) -> f64 {
+        self.pieces.iter().map(|p| (p.to - p.from).norm()).sum()
+    }
+
+    /// Returns how often the outline winds round each of `points`, in their order.
+    #[must_use]
+    pub fn windings(&self, points: &[Point2<f64>]) -> Vec<i32> {
+        let mut order: Vec<usize> = (0..points.len()).collect();
+        order.sort_by(|&a, &b| points[a].y.total_cmp(&points[b].y));
+        let heights: Vec<f64> = order.iter().map(|&i| points[i].y).collect();
+        let mut windings = vec![0; points.len()];
+        for piece in &self.pieces {
+            let (low, high, sign) = if piece.from.y < piece.to.y {
+                (piece.from, piece.to, 1)
+            } else {
+                (piece.to, piece.from, -1)
+            };
+            // A ray towards +x meets pieces with low.y <= y < high.y.
+            let first = heights.partition_point(|&y| y < low.y);
+            let end = heights.partition_point(|&y| y < high.y);
+            for &i in order.get(first..end).unwrap_or_default() {
+                if (high - low).perp(&(points[i] - low)) > 0.0 {
+                    windings[i] += sign;
+                }
+            }
+        }
+        windings
+    }
+
+    /// Returns the distance of `p` from the outline, mm; infinite when there is none.
+    #[must_use]
+    pub fn distance(&self, p: &Point2<f64>) -> f64 {
+        let distance =
+            |piece: &Piece| geom::polyline::distance_to_segment(&piece.from, &piece.to, p);
+        self.pieces.iter().map(distance).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Returns the volume that the facets enclose, mm³.
+#[must_use]
+pub fn volume(mesh: &Mesh) -> f64 {
+    let Some(origin) = mesh.vertices.first() else { return 0.0 };
+    let six_times: f64 = mesh
+        .triangles
+        .iter()
+        .filter_map(|corners| {
+            let [a, b, c] = corners_of(mesh, corners)?.map(|p| p - origin);
+            Some(a.dot(&b.cross(&c)))
+        })
+        .sum();
+    six_times / 6.0
+}
+
+/// The corners of a facet; `None` when it names no vertex or is not finite.
+fn corners_of(mesh: &Mesh, corners: &[u32; 3]) -> Option<[Point3<f64>; 3]> {
+    let corner = |k: usize| mesh.vertices.get(corners[k] as usize).copied();
+    let corners = [corner(0)?, corner(1)?, corner(2)?];
+    corners.iter().all(|p| p.coords.iter().all(|c| c.is_finite())).then_some(corners)
+}
+
+fn piece(corners: &[Point3<f64>; 3], z: f64) -> Option<Piece> {
+    let mut from = None;
+    let mut to = None;
+    for k in 0..3 {
+        let (a, b) = (&corners[k], &corners[(k + 1) % 3]);
+        match (a.z < z, b.z < z) {
+            // Computed from the lower end in both facets of an edge: the same point in both.
+            (false, true) => from = Some(crossing(b, a, z)),
+            (true, false) => to = Some(crossing(a, b, z)),
+            _ => {}
+        }
+    }
+    Some(Piece { from: from?, to: to? })
+}
+
+fn crossing(low: &Point3<f64>, high: &Point3<f64>, z: f64) -> Point2<f64> {
+    let share = (z - low.z) / (high.z - low.z);
+    let along: Vector2<f64> = high.xy() - low.xy();
+    low.xy() + along * share
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A box around the z axis shifted by `x`, with a square hole through it when `hole` > 0;
+    /// half-widths in mm.
+    pub(crate) fn block(half: f64, hole: f64, height: f64, x: f64) -> Mesh {
+        let mut mesh = Mesh::default();
+        add_shell(&mut mesh, half, [0.0, height], x, false);
+        if hole > 0.0 {
+            add_shell(&mut mesh, hole, [-1.0, height + 1.0], x, true);
+        }
+        mesh
+    }
+
+    /// The hole sticks out above and below, which no cut within the height sees.
+    fn add_shell(mesh: &mut Mesh, half: f64, z: [f64; 2], x: f64, inside_out: bool) {
+        let base = mesh.vertices.len() as u32;
+        for z in z {
+            for (sx, sy) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
+                mesh.vertices.push(Point3::new(x + sx * half, sy * half, z));
+            }
+        }
+        let faces: [[u32; 4]; 6] =
+            [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+        for [a, b, c, d] in faces {
+            for t in [[a, b, c], [a, c, d]] {
+                let [a, b, c] = t.map(|k| base + k);
+                mesh.triangles.push(if inside_out { [a, c, b] } else { [a, b, c] });
+            }
+        }
+    }
+
+    fn cut(mesh: &Mesh, z: f64) -> Section {
+        let mut section = Section::default();
+        Sweep::new(mesh).cut(z, &mut section);
+        section
+    }
+
+    #[test]
+    fn area_and_length_of_a_block_with_a_hole() {
+        let section = cut(&block(10.0, 4.0, 8.0, 3.0), 2.5);
+        assert!((section.area() - (400.0 - 64.0)).abs() < 1e-12);
+        assert!((section.perimeter() - (80.0 + 32.0)).abs() < 1e-12);
+        assert!(cut(&block(10.0, 0.0, 8.0, 0.0), 9.0).pieces.is_empty());
+        assert!((volume(&block(10.0, 0.0, 8.0, 50.0)) - 3200.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_sweep_equals_single_cuts_in_any_order() {
+        let share = |i: u32, step: f64| (f64::from(i) * step).fract();
+        let vertices =
+            (0..600).map(|i| Point3::new(share(i, 0.618), share(i, 0.37), share(i, 0.17)));
+        let mesh = Mesh {
+            vertices: vertices.collect(),
+            triangles: (0..200).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+        };
+        let mut sweep = Sweep::new(&mesh);
+        let mut section = Section::default();
+        for z in [-0.9, 0.3, 0.31, 0.5, 0.7, 2.0, 0.2, f64::NAN, 0.4] {
+            sweep.cut(z, &mut section);
+            let mut expected = cut(&mesh, z).pieces;
+            let mut found = section.pieces.clone();
+            let key = |p: &Piece| (p.from.x.to_bits(), p.from.y.to_bits());
+            expected.sort_by_key(key);
+            found.sort_by_key(key);
+            assert_eq!(found, expected, "z = {z}");
+        }
+    }
+
+    #[test]
+    fn inside_is_where_the_outline_winds_round() {
+        let section = cut(&block(10.0, 4.0, 8.0, 0.0), 1.0);
+        let places = [[0.0, 0.0], [7.0, 0.0], [-7.0, 3.0], [11.0, 0.0], [-12.0, 4.0], [4.5, 9.9]];
+        let points = places.map(Point2::from);
+        assert_eq!(section.windings(&points), [0, 1, 1, 0, 0, 1]);
+        assert_eq!(section.distance(&points[3]), 1.0);
+        assert_eq!(section.distance(&points[0]), 4.0);
+    }
+
+    #[test]
+    fn a_cut_through_vertices_is_closed() {
+        let mut mesh = block(5.0, 0.0, 10.0, 0.0);
+        // A corner row at exactly the height of the cut.
+        mesh.vertices[4].z = 4.0;
+        mesh.vertices[5].z = 4.0;
+        for z in [4.0, 4.0 - 1e-12, 4.0 + 1e-12] {
+            let area = cut(&mesh, z).area();
+            assert!((area - 100.0).abs() < 1e-6, "{z}: {area}");
+        }
+    }
+
+    #[test]
+    fn broken_facets_are_left_out() {
+        let mut mesh = block(5.0, 0.0, 10.0, 0.0);
+        mesh.triangles.push([0, 1, 99]);
+        mesh.vertices.push(Point3::new(f64::NAN, 0.0, 2.0));
+        mesh.triangles.push([0, 6, 8]);
+        assert!((cut(&mesh, 5.0).area() - 100.0).abs() < 1e-12);
+        assert!((volume(&mesh) - 1000.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,99 @@
+//! One motion line of a program, and all that is known of it.
+
+use nalgebra::Point3;
+
+use crate::curve::Curve;
+use machine::program::{Feed, Joints, Role};
+
+/// What a segment does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The nozzle moves and lays material.
+    Extrusion,
+    /// The nozzle moves, the filament stands still.
+    Travel,
+    /// The nozzle moves while filament is drawn back.
+    Wipe,
+    /// Only filament moves, backwards.
+    Retraction,
+    /// Only filament moves, forwards.
+    Prime,
+    /// The line names the place where everything already is.
+    Still,
+}
+
+/// One motion line. Frames and units as in the [crate].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Segment {
+    /// Its line in the program, counted from 1.
+    pub line: usize,
+    /// The layer that was announced last.
+    pub layer: Option<usize>,
+    /// What the material is for, as announced last; `Custom` before that.
+    pub role: Role,
+    /// The width of the bead as announced last, mm; 0 before that.
+    pub width: f64,
+    /// The joints at both ends; `None` where the firmware takes part coordinates.
+    pub joints: Option<[Joints; 2]>,
+    /// Where the nozzle is in the part at both ends, mm.
+    pub part: [Point3<f64>; 2],
+    /// The path over the bed.
+    pub curve: Curve,
+    /// The length of the path over the part, lift included, mm.
+    pub path: f64,
+    /// The least distance from the axis on the way, mm.
+    pub nearest: f64,
+    /// Filament fed, mm; negative when it is drawn back.
+    pub filament: f64,
+    /// The speed that holds on this line: of the nozzle, or of the filament where only that
+    /// moves. Zero when none was ever given.
+    pub feed: Feed,
+    /// How long it takes at that speed, s; zero when nothing moves or no speed was given.
+    pub duration: f64,
+}
+
+impl Segment {
+    /// Returns what it does.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        if self.path > 0.0 {
+            if self.filament > 0.0 {
+                Kind::Extrusion
+            } else if self.filament < 0.0 {
+                Kind::Wipe
+            } else {
+                Kind::Travel
+            }
+        } else if self.filament > 0.0 {
+            Kind::Prime
+        } else if self.filament < 0.0 {
+            Kind::Retraction
+        } else {
+            Kind::Still
+        }
+    }
+
+    /// Returns whether it lays material on the way.
+    #[must_use]
+    pub fn extrudes(&self) -> bool {
+        self.path > 0.0 && self.filament > 0.0
+    }
+
+    /// Returns how far the bed turns, radians; zero in part coordinates.
+    #[must_use]
+    pub fn bed_change(&self) -> f64 {
+        self.curve.turn()
+    }
+
+    /// Returns how far the carriage runs, mm; zero in part coordinates.
+    #[must_use]
+    pub fn rail_change(&self) -> f64 {
+        self.joints.map_or(0.0, |[from, to]| to.s - from.s)
+    }
+
+    /// Returns how far the nozzle rises, mm.
+    #[must_use]
+    pub fn lift_change(&self) -> f64 {
+        self.part[1].z - self.part[0].z
+    }
+}

@@ -1,0 +1,275 @@
+//! Runs all checks over a program, line by line.
+//!
+//! ```
+//! use machine::gcode::dialect::POLAR;
+//! use twin::verify::{Setup, Verifier};
+//! # fn example(printer: &machine::profile::Printer, mesh: &mesh::mesh::Mesh, text: &str) {
+//! let filament_area = 2.405;
+//! let setup = Setup { printer, dialect: POLAR, filament_area, mesh: Some(mesh), solid: false };
+//! let mut verifier = Verifier::new(setup);
+//! for line in text.lines() {
+//!     verifier.line(line);
+//! }
+//! let verdict = verifier.finish();
+//! assert!(verdict.worst().is_none(), "{:?}", verdict.findings);
+//! # }
+//! ```
+//!
+//! Nothing is allocated for a line without a finding, outside the begin of a layer; memory is the
+//! sums of the layers, the findings kept, and an index of the mesh by height.
+
+use machine::gcode::dialect::{Dialect, Space};
+use machine::profile::Printer;
+use mesh::mesh::Mesh;
+
+use crate::check::acceleration::Acceleration;
+use crate::check::axis::Clearance;
+use crate::check::continuity::Continuity;
+use crate::check::deposit::Deposit;
+use crate::check::heat::Heat;
+use crate::check::modes::Modes;
+use crate::check::reach::Reach;
+use crate::check::speed::Speed;
+use crate::check::text::Text;
+use crate::check::volume::Volume;
+use crate::finding::{Finding, Findings, Omitted, Place, Severity};
+use crate::replay::{Event, Heating, LayerMark, Replay, read};
+use crate::rounding::Doubt;
+use crate::section::{Section, Sweep, volume};
+use crate::segment::Segment;
+use crate::totals::{Tally, Totals};
+
+/// What a program is judged by.
+#[derive(Debug, Clone, Copy)]
+pub struct Setup<'a> {
+    /// The machine.
+    pub printer: &'a Printer,
+    /// The words of the program.
+    pub dialect: Dialect,
+    /// The cross-section of the filament, mm².
+    pub filament_area: f64,
+    /// The part as it was placed, in the frame of the part.
+    pub mesh: Option<&'a Mesh>,
+    /// Whether the print is meant to be solid.
+    pub solid: bool,
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verdict {
+    /// What was found, by line; at most [`crate::finding::MOST_KEPT`] of each check and severity.
+    pub findings: Vec<Finding>,
+    /// How many more there are.
+    pub omitted: Vec<Omitted>,
+    /// What could not be judged, and why.
+    pub notes: Vec<&'static str>,
+    /// The sums of the program.
+    pub totals: Totals,
+}
+
+impl Verdict {
+    /// Returns how bad the worst finding is; `None` when there is none.
+    #[must_use]
+    pub fn worst(&self) -> Option<Severity> {
+        self.findings.iter().map(|finding| finding.severity).max()
+    }
+}
+
+/// Judges a program while it is read.
+#[derive(Debug)]
+pub struct Verifier<'a> {
+    replay: Replay,
+    findings: Findings,
+    tally: Tally,
+    text: Text,
+    modes: Modes,
+    reach: Reach,
+    clearance: Clearance,
+    speed: Speed,
+    acceleration: Acceleration,
+    continuity: Continuity,
+    heat: Heat,
+    volume: Volume,
+    deposit: Deposit,
+    part: Option<Part<'a>>,
+    setup: Setup<'a>,
+}
+
+/// The mesh and what is cut from it at the present layer.
+#[derive(Debug)]
+struct Part<'a> {
+    sweep: Sweep<'a>,
+    section: Section,
+}
+
+impl<'a> Verifier<'a> {
+    /// Returns a verifier before the first line.
+    #[must_use]
+    pub fn new(setup: Setup<'a>) -> Self {
+        let Setup { printer, dialect, filament_area, mesh, .. } = setup;
+        Self {
+            replay: Replay::new(printer, dialect),
+            findings: Findings::default(),
+            tally: Tally::default(),
+            text: Text::new(dialect),
+            modes: Modes::default(),
+            reach: Reach::new(printer),
+            clearance: Clearance::new(printer),
+            speed: Speed::new(printer),
+            acceleration: Acceleration::new(printer),
+            continuity: Continuity::default(),
+            heat: Heat::new(printer),
+            volume: Volume::new(filament_area, printer.nozzle_diameter),
+            deposit: Deposit::default(),
+            part: mesh.map(|mesh| Part { sweep: Sweep::new(mesh), section: Section::default() }),
+            setup,
+        }
+    }
+
+    /// Judges the next line, and returns its motion for whoever draws it.
+    pub fn line(&mut self, text: &str) -> Option<Segment> {
+        let place = self.next_place();
+        self.text.characters(text.as_bytes(), place, &mut self.findings);
+        self.readable(text, place)
+    }
+
+    /// Judges the next line, whatever bytes it is made of.
+    pub fn line_bytes(&mut self, text: &[u8]) -> Option<Segment> {
+        let place = self.next_place();
+        self.text.characters(text, place, &mut self.findings);
+        match std::str::from_utf8(text) {
+            Ok(text) => self.readable(text, place),
+            // That these are no printable characters has been said already.
+            Err(_) => {
+                self.replay.skip();
+                None
+            }
+        }
+    }
+
+    /// Ends the program.
+    #[must_use]
+    pub fn finish(mut self) -> Verdict {
+        let place = Place::line(self.replay.lines(), self.replay.layer());
+        self.end_layer();
+        self.acceleration.rest(&mut self.findings);
+        self.continuity.end(place, &mut self.findings);
+        self.heat.end(place, &mut self.findings);
+        let enclosed = self.setup.mesh.map(volume);
+        let unjudged = self.volume.end(enclosed, self.setup.solid, &mut self.findings);
+        let mut notes: Vec<&'static str> = unjudged.into_iter().collect();
+        if self.setup.dialect.space == Space::Part {
+            notes.push(
+                "speed, acceleration: the firmware turns these words into joints itself, so \
+                 bed and carriage are not judged",
+            );
+        }
+        let totals = self.totals();
+        let (findings, omitted) = self.findings.into_parts();
+        Verdict { findings, omitted, notes, totals }
+    }
+
+    fn next_place(&self) -> Place {
+        Place::line(self.replay.lines() + 1, self.replay.layer())
+    }
+
+    fn readable(&mut self, text: &str, place: Place) -> Option<Segment> {
+        let line = match read(text) {
+            Ok(line) => line,
+            Err(error) => {
+                self.text.unreadable(&error, place, &mut self.findings);
+                self.replay.skip();
+                return None;
+            }
+        };
+        if let Some(command) = &line.command {
+            self.text.command(command, place, &mut self.findings);
+            self.modes.command(command, place, &mut self.findings);
+        }
+        match self.replay.follow(&line) {
+            Event::Nothing => {}
+            Event::Segment(segment) => {
+                self.segment(&segment);
+                return Some(segment);
+            }
+            Event::Layer(mark) => self.layer(mark),
+            Event::Rest => self.acceleration.rest(&mut self.findings),
+            Event::Nozzle(heating) => {
+                self.wait(heating);
+                self.heat.nozzle(heating, place, &mut self.findings);
+            }
+            Event::Bed(heating) => {
+                self.wait(heating);
+                self.heat.bed(heating, place, &mut self.findings);
+            }
+        }
+        None
+    }
+
+    fn segment(&mut self, segment: &Segment) {
+        let findings = &mut self.findings;
+        let doubt = Doubt::of(segment);
+        self.tally.segment(segment);
+        self.reach.segment(segment, findings);
+        self.clearance.segment(segment, findings);
+        self.speed.segment(segment, &doubt, findings);
+        self.acceleration.segment(segment, &doubt, findings);
+        self.continuity.segment(segment, findings);
+        self.heat.segment(segment, findings);
+        self.volume.segment(segment);
+        if self.part.is_some() {
+            self.deposit.segment(segment);
+        }
+    }
+
+    fn wait(&mut self, heating: Heating) {
+        if heating.waits {
+            self.acceleration.rest(&mut self.findings);
+        }
+    }
+
+    fn layer(&mut self, mark: LayerMark) {
+        self.end_layer();
+        self.continuity.layer(mark, &mut self.findings);
+        let middle = mark.top.zip(mark.height).map(|(top, height)| top - height / 2.0);
+        let section = match (&mut self.part, middle) {
+            (Some(part), Some(middle)) => {
+                part.sweep.cut(middle, &mut part.section);
+                Some(&part.section)
+            }
+            _ => None,
+        };
+        self.volume.layer(mark, section);
+        self.deposit.layer(mark.index, mark.top.filter(|_| section.is_some()));
+    }
+
+    fn end_layer(&mut self) {
+        if let Some(part) = &self.part {
+            self.deposit.end_of_layer(&part.section, &mut self.findings);
+        }
+    }
+
+    fn totals(&self) -> Totals {
+        let Tally { time, travel, moves, short_moves, bed_turn, nearest_to_axis, .. } = self.tally;
+        Totals {
+            lines: self.replay.lines(),
+            time,
+            filament: self.volume.filament(),
+            volume: self.volume.filament() * self.setup.filament_area,
+            by_role: self.volume.by_role(),
+            travel,
+            moves,
+            short_moves,
+            retractions: self.continuity.retractions(),
+            moves_per_second: self.tally.moves_per_second,
+            bed_turns: bed_turn / std::f64::consts::TAU,
+            layers: self.volume.layers().to_vec(),
+            bed_speed: self.speed.greatest_bed(),
+            rail_speed: self.speed.greatest_rail(),
+            bed_acceleration: self.acceleration.greatest_bed(),
+            rail_acceleration: self.acceleration.greatest_rail(),
+            deviation: self.continuity.worst_deviation(),
+            nearest_to_axis,
+        }
+    }
+}
