@@ -30,21 +30,32 @@ impl Region {
     /// Returns the points of the region at least `distance` (mm, not negative) from its border.
     #[must_use]
     pub fn inset(&self, distance: f64) -> Self {
-        self.shifted(distance, ARC_TOLERANCE_MM)
+        self.shifted(distance, &EXACT)
     }
 
     /// Returns the points at most `distance` (mm, not negative) from the region; its convex
     /// corners become round.
     #[must_use]
     pub fn outset(&self, distance: f64) -> Self {
-        self.shifted(-distance, ARC_TOLERANCE_MM)
+        self.shifted(-distance, &EXACT)
+    }
+
+    /// Like [`outset`](Self::outset), with convex corners kept sharp as long as they reach no
+    /// farther than [`LONGEST_MITER`] times the distance, and arcs to within
+    /// [`OPENING_TOLERANCE_MM`].
+    #[must_use]
+    pub fn outset_sharp(&self, distance: f64) -> Self {
+        self.shifted(
+            -distance,
+            &Arcs { tolerance: OPENING_TOLERANCE_MM, longest_miter: LONGEST_MITER },
+        )
     }
 
     /// Returns the part of the region that a disc of `radius` (mm) inside it can sweep, to within
     /// [`OPENING_TOLERANCE_MM`].
     #[must_use]
     pub fn opened(&self, radius: f64) -> Self {
-        self.shifted(radius, OPENING_TOLERANCE_MM).shifted(-radius, OPENING_TOLERANCE_MM)
+        self.shifted(radius, &COARSE).shifted(-radius, &COARSE)
     }
 
     /// Returns the inset and the area (mm²) over which its border ran into itself: zero, up to
@@ -53,7 +64,7 @@ impl Region {
     /// That area is what the raw rings enclose with the wrong winding; it costs nothing to know.
     #[must_use]
     pub fn inset_with_loss(&self, distance: f64) -> (Self, f64) {
-        let raw = self.raw_rings(distance, ARC_TOLERANCE_MM);
+        let raw = self.raw_rings(distance, &EXACT);
         let enclosed: f64 = raw.iter().map(|ring| signed_area(ring)).sum();
         let inset = Self::from_grid_rings(&raw, Fill::Positive);
         let lost = inset.area() - enclosed;
@@ -61,19 +72,33 @@ impl Region {
     }
 
     /// Moves the border to the left of its direction, that is inwards, by `shift` mm.
-    fn shifted(&self, shift: f64, arc_tolerance: f64) -> Self {
+    fn shifted(&self, shift: f64, arcs: &Arcs) -> Self {
         if self.is_empty() || shift == 0.0 {
             return self.clone();
         }
-        Self::from_grid_rings(&self.raw_rings(shift, arc_tolerance), Fill::Positive)
+        Self::from_grid_rings(&self.raw_rings(shift, arcs), Fill::Positive)
     }
 
-    fn raw_rings(&self, shift: f64, arc_tolerance: f64) -> Vec<Ring> {
+    fn raw_rings(&self, shift: f64, arcs: &Arcs) -> Vec<Ring> {
         debug_assert!(shift.is_finite());
-        let steps = |length: f64| length * STEPS_PER_MM;
-        self.rings().map(|ring| raw_ring(ring, steps(shift), steps(arc_tolerance))).collect()
+        self.rings().map(|ring| raw_ring(ring, shift * STEPS_PER_MM, arcs)).collect()
     }
 }
+
+/// How corners are rounded whose moved sides drift apart.
+struct Arcs {
+    /// How far chords may cut into arcs, mm.
+    tolerance: f64,
+    /// Corners whose sides cross within this many distances are not rounded at all; 0 rounds all.
+    longest_miter: f64,
+}
+
+const EXACT: Arcs = Arcs { tolerance: ARC_TOLERANCE_MM, longest_miter: 0.0 };
+
+const COARSE: Arcs = Arcs { tolerance: OPENING_TOLERANCE_MM, longest_miter: 0.0 };
+
+/// Corners of an outset that may stay sharp reach this many distances at most: those over 19°.
+pub const LONGEST_MITER: f64 = 6.0;
 
 /// One side of a ring, in grid steps.
 struct Side {
@@ -108,8 +133,8 @@ impl Corner {
     }
 }
 
-/// The raw ring of one ring; all lengths in grid steps.
-fn raw_ring(ring: &[GridPoint], shift: f64, arc_tolerance: f64) -> Ring {
+/// The raw ring of one ring; `shift` in grid steps.
+fn raw_ring(ring: &[GridPoint], shift: f64, arcs: &Arcs) -> Ring {
     let count = ring.len();
     let float = |p: GridPoint| Point2::new(f64::from(p.x), f64::from(p.y));
     let sides: Vec<Side> = (0..count)
@@ -142,13 +167,13 @@ fn raw_ring(ring: &[GridPoint], shift: f64, arc_tolerance: f64) -> Ring {
     let mut raw = Vec::with_capacity(count + count / 4);
     for (i, corner) in corners.iter().enumerate() {
         let both_fit = fits[(i + count - 1) % count] && fits[i];
-        join(corner, shift, arc_tolerance, both_fit, &mut raw);
+        join(corner, shift, arcs, both_fit, &mut raw);
     }
     raw
 }
 
 /// Appends the raw ring's points at one corner.
-fn join(corner: &Corner, shift: f64, arc_tolerance: f64, sides_fit: bool, raw: &mut Ring) {
+fn join(corner: &Corner, shift: f64, arcs: &Arcs, sides_fit: bool, raw: &mut Ring) {
     let mut push = |p: Point2<f64>| {
         // The sum of a grid coordinate and an offset, both far below 2^31.
         raw.push(GridPoint::new(p.x.round() as i32, p.y.round() as i32));
@@ -166,10 +191,11 @@ fn join(corner: &Corner, shift: f64, arc_tolerance: f64, sides_fit: bool, raw: &
     }
     let (cos, sin) = corner.turn;
     let radius = shift.abs();
-    let tolerance = arc_tolerance.min(radius / 2.0);
-    // The crossing lies radius·(1/cos(turn/2) − 1) outside the arc.
+    let tolerance = (arcs.tolerance * STEPS_PER_MM).min(radius / 2.0);
+    // The crossing lies radius/cos(turn/2) from the corner.
     let cos_half = ((1.0 + cos) / 2.0).max(0.0).sqrt();
-    if radius * (1.0 - cos_half) <= tolerance * cos_half {
+    let is_near_arc = radius * (1.0 - cos_half) <= tolerance * cos_half;
+    if is_near_arc || cos_half * arcs.longest_miter >= 1.0 {
         push(corner.crossing(shift));
         return;
     }
@@ -251,6 +277,15 @@ mod tests {
         let grown = square(10.0).outset(2.0);
         let expected = 100.0 + 4.0 * 10.0 * 2.0 + PI * 4.0;
         assert!((grown.area() - expected).abs() < 0.01, "{}", grown.area());
+    }
+
+    #[test]
+    fn corners_of_a_sharp_outset_are_sharp_unless_they_are_spikes() {
+        let grown = square(10.0).outset_sharp(2.0);
+        assert!((grown.area() - 196.0).abs() < 1e-6, "{}", grown.area());
+        let spike = region(&[vec![[0.0, 0.0], [20.0, -1.0], [20.0, 1.0]]]);
+        let reach = spike.outset_sharp(0.5).bounds().unwrap().min;
+        assert!(mm(reach).x > -0.6, "{}", mm(reach));
     }
 
     #[test]

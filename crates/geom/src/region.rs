@@ -38,6 +38,25 @@ pub struct Region {
     islands: Vec<Island>,
 }
 
+/// A part of a segment that lies inside a region or outside, mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Part {
+    /// Where it begins.
+    pub from: Point2<f64>,
+    /// Where it ends.
+    pub to: Point2<f64>,
+    /// Whether it lies inside.
+    pub inside: bool,
+}
+
+impl Part {
+    /// Returns its length.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        (self.to - self.from).norm()
+    }
+}
+
 /// The least and greatest coordinates of a region, in grid steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GridBounds {
@@ -262,6 +281,35 @@ impl Region {
         self.contains(a) && !self.rings().any(crosses)
     }
 
+    /// Returns the segment from `a` to `b` (mm) cut where it meets a ring, in order.
+    #[must_use]
+    pub fn parts(&self, a: &Point2<f64>, b: &Point2<f64>) -> Vec<Part> {
+        let along = b - a;
+        let mut cuts: Vec<f64> = Vec::new();
+        for (c, d) in self.rings().flat_map(|ring| ring_sides(ring)) {
+            let (c, d) = (mm(c), mm(d));
+            let (c_side, d_side) = (along.perp(&(c - a)), along.perp(&(d - a)));
+            if (c_side > 0.0) != (d_side > 0.0) {
+                let meeting = c + (d - c) * (c_side / (c_side - d_side));
+                cuts.push((meeting - a).dot(&along) / along.norm_squared());
+            }
+        }
+        cuts.retain(|share| 0.0 < *share && *share < 1.0);
+        cuts.sort_unstable_by(f64::total_cmp);
+        let points: Vec<Point2<f64>> = std::iter::once(*a)
+            .chain(cuts.iter().map(|share| a + along * *share))
+            .chain([*b])
+            .collect();
+        points
+            .windows(2)
+            .map(|ends| Part {
+                from: ends[0],
+                to: ends[1],
+                inside: self.contains(&nalgebra::center(&ends[0], &ends[1])),
+            })
+            .collect()
+    }
+
     /// Checks what the module promises of every region: rings of three points or more, outer rings
     /// counter-clockwise, holes clockwise. For tests.
     ///
@@ -401,6 +449,19 @@ mod tests {
             region(&[rectangle(0.0, 0.0, 10.0, 10.0), rectangle(5.0, 0.0, 10.0, 10.0)]).area(),
             150.0,
         );
+    }
+
+    #[test]
+    fn a_segment_is_cut_at_the_rings() {
+        let mut hole = rectangle(4.0, 4.0, 2.0, 2.0);
+        hole.reverse();
+        let frame = region(&[rectangle(0.0, 0.0, 10.0, 10.0), hole]);
+        let parts = frame.parts(&Point2::new(-1.0, 5.0), &Point2::new(8.0, 5.0));
+        let shown: Vec<(f64, bool)> =
+            parts.iter().map(|part| (part.length(), part.inside)).collect();
+        assert_eq!(shown, [(1.0, false), (4.0, true), (2.0, false), (2.0, true)]);
+        let away = frame.parts(&Point2::new(20.0, 0.0), &Point2::new(20.0, 5.0));
+        assert_eq!((away.len(), away[0].inside), (1, false));
     }
 
     #[test]

@@ -68,7 +68,8 @@ pub enum MeshError {
     /// Nothing in the file encloses a volume.
     #[error(
         "the {facets} facets enclose no volume: {degenerate} have two equal corners, \
-         {dropped} surfaces ({dropped_mm2:.3} mm²) are flat, open or doubled"
+         {dropped} surfaces ({} mm²) are flat, open or doubled",
+        note::number(*dropped_mm2)
     )]
     NoVolume {
         /// Facets in the file.

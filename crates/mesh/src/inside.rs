@@ -61,6 +61,8 @@ impl<'a> Rays<'a> {
         skipped: u32,
         touch: f64,
     ) -> Option<Vec<(u32, i32)>> {
+        // Asking the tree costs as much as looking at what it finds.
+        self.visit(1)?;
         let met = match &self.tree {
             None => None,
             Some(tree) => {
@@ -68,8 +70,7 @@ impl<'a> Rays<'a> {
                 Some(tree.meeting(&Bounds::of([p, &end]).grown(touch)))
             }
         };
-        let n_visits = met.as_ref().map_or(self.triangles.len(), Vec::len);
-        self.visits_left.set(self.visits_left.get().checked_sub(n_visits)?);
+        self.visit(met.as_ref().map_or(self.triangles.len(), Vec::len))?;
         let mut crossings = Vec::new();
         let mut visit = |triangle: u32| {
             let shell = self.solid.shell_of()[triangle as usize];
@@ -92,14 +93,20 @@ impl<'a> Rays<'a> {
     /// Returns whether `p` is nearer than `touch` (mm) to a triangle of `shell`, or whether that
     /// would take too long to find out.
     pub(crate) fn touches(&self, p: &Point3<f64>, shell: u32, touch: f64) -> bool {
-        let Some(left) = self.visits_left.get().checked_sub(self.triangles.len()) else {
+        if self.visit(self.triangles.len()).is_none() {
             return true;
-        };
-        self.visits_left.set(left);
+        }
         self.triangles
             .iter()
             .filter(|t| self.solid.shell_of()[**t as usize] == shell)
             .any(|t| distance_to(&self.solid.mesh().corners(*t), p) < touch)
+    }
+
+    /// Counts visits; `None` from the moment that there are too many.
+    fn visit(&self, n: usize) -> Option<()> {
+        let left = self.visits_left.get().checked_sub(n);
+        self.visits_left.set(left.unwrap_or(0));
+        left.map(|_| ())
     }
 
     fn crossing(&self, triangle: u32, p: &Point3<f64>, touch: f64) -> Crossing {

@@ -79,8 +79,10 @@ pub(crate) fn count(n: usize, noun: &str) -> String {
 
 /// Returns a quantity with as many digits as a reader can use; never `-0`.
 pub(crate) fn number(value: f64) -> String {
+    // Three decimals show nothing of less, and nobody reads more digits.
+    const PLAIN: std::ops::Range<f64> = 1e-3..1e6;
     let size = value.abs();
-    if size != 0.0 && !(1e-3..1e6).contains(&size) {
+    if size != 0.0 && !PLAIN.contains(&size) {
         return format!("{value:.2e}");
     }
     let text = format!("{value:.3}");

@@ -17,14 +17,16 @@
 //! none on how the model is turned about z: a model that is turned rests as before, but turned.
 //!
 //! When no class has a twentieth of the area there is no flat side to speak of, and the pose is
-//! kept.
+//! kept. Classes of which nothing would lie on the bed, because something else of the part sticks
+//! out farther, are passed over: such a part would stand on a point.
 
 mod classes;
 
 use crate::mesh::Mesh;
 use crate::place::reference_azimuth;
 use classes::Faces;
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// What counts as one direction and as an overhang.
@@ -58,7 +60,7 @@ pub struct Candidate {
 pub enum Rest {
     /// On a flat side.
     Flat(Candidate),
-    /// As it was: the largest class has only this share of the area.
+    /// As it was: no class is large enough, or none of those can lie on the bed.
     Kept {
         /// Area of the largest class by the area of the surface.
         largest_share: f64,
@@ -68,6 +70,13 @@ pub enum Rest {
 /// Below this share of the area, a class is no flat side: an icosphere has 0.2 %, a part with one
 /// flat worth standing on has at least this.
 const LEAST_SHARE: f64 = 0.05;
+
+/// A side to lie on has this share of the area, at least, ...
+const LEAST_STAND_SHARE: f64 = 1e-3;
+
+/// ... this near to the bed, as a share of the diagonal: a scanned side is rough, and nothing of
+/// it may lie on the bed to within [`BED_SHARE`].
+const STAND_DEPTH_SHARE: f64 = 1e-2;
 
 /// Areas (as a share of the surface) and heights (as a share of the size) that differ by less
 /// are equal. Rounding to `f32` moves them by 1e-7; two sides that a designer made different, by
@@ -96,14 +105,22 @@ pub fn candidates(mesh: &Mesh, params: &OrientParams) -> Vec<Candidate> {
 pub fn rest(mesh: &Mesh, params: &OrientParams) -> (Rotation3<f64>, Rest) {
     let faces = Faces::of(mesh);
     let classes = classes::classes(&faces, params.class_tolerance_rad);
-    let largest = classes.first().map_or(0.0, |class| class.area_mm2);
-    let largest_share = if faces.total_mm2 > 0.0 { largest / faces.total_mm2 } else { 0.0 };
-    if largest_share < LEAST_SHARE {
-        return (Rotation3::identity(), Rest::Kept { largest_share });
+    let largest_share = classes.first().map_or(0.0, |class| class.area_mm2 / faces.total_mm2);
+    let mut classes = classes.as_slice();
+    while let Some(first) = classes.first().filter(|c| c.area_mm2 >= LEAST_SHARE * faces.total_mm2)
+    {
+        let least = first.area_mm2 - SAME_SHARE * faces.total_mm2;
+        let (tied, smaller) = classes.split_at(classes.partition_point(|c| c.area_mm2 >= least));
+        let stands = |c: &Candidate| {
+            let side = Side::below(mesh, &faces, &c.down, params, STAND_DEPTH_SHARE);
+            side.area_mm2 >= LEAST_STAND_SHARE * faces.total_mm2
+        };
+        if let Some(best) = ranked(mesh, &faces, tied, params).into_iter().find(stands) {
+            return (part_from_model(mesh, &best.down), Rest::Flat(best));
+        }
+        classes = smaller;
     }
-    let tied = classes.partition_point(|c| c.area_mm2 >= largest - SAME_SHARE * faces.total_mm2);
-    let best = ranked(mesh, &faces, &classes[..tied], params)[0];
-    (part_from_model(mesh, &best.down), Rest::Flat(best))
+    (Rotation3::identity(), Rest::Kept { largest_share })
 }
 
 /// Returns the rotation that takes a direction to −z, without losing digits anywhere.
@@ -142,12 +159,12 @@ fn ranked(
     classes: &[classes::Class],
     params: &OrientParams,
 ) -> Vec<Candidate> {
-    let both_ways = classes.iter().flat_map(|class| {
+    let both_ways = classes.par_iter().flat_map(|class| {
         [class.direction, -class.direction].map(|down| candidate(mesh, faces, class, down, params))
     });
     let mut left: Vec<Candidate> = both_ways.collect();
     let area = SAME_SHARE * faces.total_mm2;
-    let length = SAME_SHARE * mesh.bounds().diagonal();
+    let length = SAME_SHARE * faces.diagonal;
     // Computed when two candidates differ in nothing else.
     let mut reference = None;
     let mut ranked = Vec::with_capacity(left.len());
@@ -187,30 +204,55 @@ fn candidate(
     down: Vector3<f64>,
     params: &OrientParams,
 ) -> Candidate {
-    let depth = |p: &nalgebra::Point3<f64>| p.coords.dot(&down);
-    let (mut top, mut bed) = (f64::INFINITY, f64::NEG_INFINITY);
-    for p in &mesh.vertices {
-        top = top.min(depth(p));
-        bed = bed.max(depth(p));
-    }
-    let near_bed = bed - BED_SHARE * mesh.bounds().diagonal();
-    let of_class = params.class_tolerance_rad.cos();
-    let steep = params.overhang_rad.sin() + SAME_SHARE;
-    let (mut bed_area, mut overhang_area) = (0.0, 0.0);
-    for (t, (normal, area)) in (0..).zip(faces.normals.iter().zip(&faces.areas_mm2)) {
-        let facing = normal.dot(&down);
-        if facing >= of_class && mesh.corners(t).iter().all(|p| depth(p) >= near_bed) {
-            bed_area += area;
-        } else if facing > steep {
-            overhang_area += area;
-        }
-    }
+    let side = Side::below(mesh, faces, &down, params, BED_SHARE);
     Candidate {
-        down,
+        // Adding zero makes -0 into 0, which reads better in a report.
+        down: down.map(|c| c + 0.0),
         class_area_mm2: class.area_mm2,
-        bed_area_mm2: bed_area,
-        height_mm: if mesh.vertices.is_empty() { 0.0 } else { bed - top },
-        overhang_area_mm2: overhang_area,
+        bed_area_mm2: side.area_mm2,
+        height_mm: side.height_mm,
+        overhang_area_mm2: side.overhang_area_mm2,
+    }
+}
+
+/// What is at the bottom of a part when some direction goes down.
+struct Side {
+    /// Area that faces down and is near the bed.
+    area_mm2: f64,
+    /// Area elsewhere that faces down too steeply.
+    overhang_area_mm2: f64,
+    height_mm: f64,
+}
+
+impl Side {
+    /// Looks at the facets within `depth_share` of the diagonal from the bed.
+    fn below(
+        mesh: &Mesh,
+        faces: &Faces,
+        down: &Vector3<f64>,
+        params: &OrientParams,
+        depth_share: f64,
+    ) -> Self {
+        let depth = |p: &Point3<f64>| p.coords.dot(down);
+        let (mut top, mut bed) = (f64::INFINITY, f64::NEG_INFINITY);
+        for p in &mesh.vertices {
+            top = top.min(depth(p));
+            bed = bed.max(depth(p));
+        }
+        let near_bed = bed - depth_share * faces.diagonal;
+        let of_class = params.class_tolerance_rad.cos();
+        let steep = params.overhang_rad.sin() + SAME_SHARE;
+        let height_mm = if mesh.vertices.is_empty() { 0.0 } else { bed - top };
+        let mut side = Self { area_mm2: 0.0, overhang_area_mm2: 0.0, height_mm };
+        for (t, (normal, area)) in (0..).zip(faces.normals.iter().zip(&faces.areas_mm2)) {
+            let facing = normal.dot(down);
+            if facing >= of_class && mesh.corners(t).iter().all(|p| depth(p) >= near_bed) {
+                side.area_mm2 += area;
+            } else if facing > steep {
+                side.overhang_area_mm2 += area;
+            }
+        }
+        side
     }
 }
 
@@ -292,9 +334,21 @@ mod tests {
     }
 
     #[test]
+    fn parts_do_not_stand_on_a_point() {
+        // A dish with a spike on both sides of its flat walls.
+        let spike =
+            |z: f64| [[0.0, -z], [2.0, 0.0], [20.0, 0.0], [20.0, 1.0], [2.0, 1.0], [0.0, 1.0 + z]];
+        let (_, both) = rest(&shapes::revolved(&spike(9.0), 32), &USUAL);
+        assert!(matches!(both, Rest::Kept { largest_share } if largest_share > 0.5), "{both:?}");
+        let mut one_side = spike(9.0);
+        one_side[0][1] = 0.0;
+        assert!((best(&shapes::revolved(&one_side, 32)).down + Vector3::z()).norm() < 1e-9);
+    }
+
+    #[test]
     fn noise_does_not_split_a_side() {
         let mut mesh = shapes::block(10.0, 20.0, 30.0);
-        // Every face in a grid, every vertex off by some micrometres.
+        // Every corner is off by up to 10 µm.
         let mut state = 3_u64;
         let mut noise = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);

@@ -6,7 +6,7 @@
 //! * [`self_intersections`] looks at all pairs of triangles whose boxes meet.
 //! * [`shell_meetings`] looks at pairs of shells only: it finds the first crossing of each pair;
 //!   where there is none it asks, at some points of each solid shell, how often the other shells
-//!   wind round them ([`inside`](crate::inside)). A cavity lies in one shell, a solid in none.
+//!   wind round them (by rays). A cavity lies in one shell, a solid in none.
 //!   Solids that lie back to back on a common plane *touch*.
 //!
 //! Unit mm, frame that of the solid. Nothing shallower than [`depth_mm`] counts: parts that are

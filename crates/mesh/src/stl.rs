@@ -1,8 +1,8 @@
 //! Reads STL from bytes that nobody vouches for, and writes it.
 //!
 //! Numbers are in file units, frame Model. The kind of file is decided on raw bytes
-//! ([`classify`]); binary facets are decoded by the stl_io crate in slices ([`binary`]), ASCII by
-//! our own tokens ([`ascii`]), because stl_io refuses many sound ASCII files and silently cuts
+//! (`classify`); binary facets are decoded by the stl_io crate in slices (`binary`), ASCII by
+//! our own tokens (`ascii`), because stl_io refuses many sound ASCII files and silently cuts
 //! others short. Whatever the bytes, the answer is a [`Soup`] of finite numbers without `-0` or a
 //! [`StlError`] that says where; memory follows the size of the file, never what a header claims.
 //!

@@ -3,7 +3,7 @@
 //! In: a [`Soup`] (file units, Model frame). Out: a [`Mesh`] in the same frame.
 //!
 //! 1. *Exactly*: corners with equal coordinates (−0 = 0) are one vertex. Keys are brought together
-//!    part by part ([`parts`](crate::parts)) and sorted within a part, so a crafted file cannot
+//!    part by part (`parts`) and sorted within a part, so a crafted file cannot
 //!    make it slow; vertices are numbered in the order of their first corner.
 //! 2. *Nearly*, and only where it mends something: vertices on the ends of *open* sides (sides
 //!    that one facet alone has) are joined within [`near_mm`]. A closed surface has no open sides,
@@ -13,6 +13,7 @@
 //! Joined vertices take the least position (by x, then y, then z) of their group, so that the
 //! shape does not depend on the order of the facets.
 
+use crate::groups::Groups;
 use crate::mesh::{Mesh, repeated};
 use crate::note::Tally;
 use crate::parts::{Parts, parts_for, sorted_by_bucket};
@@ -151,6 +152,9 @@ pub(crate) fn exactly(soup: &Soup) -> Mesh {
     Mesh { vertices, triangles: vertex_of.as_chunks().0.to_vec() }
 }
 
+/// Parts this large hold corners that are not spread as those of a model are.
+const LARGE_PART: usize = 1 << 20;
+
 /// Spreads keys over the range of 64 bits.
 fn mix(key: [u32; 3]) -> u64 {
     // Multipliers: odd numbers from the digits of the golden ratio, as in Fibonacci hashing
@@ -170,14 +174,20 @@ fn first_equal(items: &[u32], key: impl Fn(u32) -> [u32; 3]) -> Vec<u32> {
         let [x, y, z] = key(item).map(u128::from);
         x << 96 | y << 64 | z << 32 | position as u128
     };
-    let entries: Vec<u128> = items.iter().enumerate().map(pack).collect();
+    let mut entries: Vec<u128> = items.iter().enumerate().map(pack).collect();
     // The bits that chose the part are the high ones: these are fresh.
     let n_buckets = (items.len() / 4).next_power_of_two();
     let bucket_of = |entry: u128| {
         let key = [(entry >> 96) as u32, (entry >> 64) as u32, (entry >> 32) as u32];
         (mix(key) >> 8) as usize & (n_buckets - 1)
     };
-    let sorted = sorted_by_bucket(&entries, n_buckets, bucket_of);
+    // A part far too large has few different keys: they are nearly in order, and need no copy.
+    let sorted = if items.len() > LARGE_PART {
+        entries.sort_unstable();
+        entries
+    } else {
+        sorted_by_bucket(&entries, n_buckets, bucket_of)
+    };
     let mut firsts = vec![0; items.len()];
     for run in sorted.chunk_by(|a, b| a >> 32 == b >> 32) {
         let first = items[run[0] as u32 as usize];
@@ -262,7 +272,7 @@ fn group_near(mesh: &Mesh, loose: &[Loose]) -> Vec<(u32, u32)> {
     let position = |i: usize| mesh.vertices[loose[i].vertex as usize];
     let boxes = (0..loose.len()).map(|i| Bounds::of([&position(i)])).collect();
     let tree = BoxTree::new(boxes);
-    let mut leader: Vec<usize> = (0..loose.len()).collect();
+    let mut groups = Groups::new(loose.len());
     let mut n_pairs = 0;
     for i in 0..loose.len() {
         let p = position(i);
@@ -275,24 +285,14 @@ fn group_near(mesh: &Mesh, loose: &[Loose]) -> Vec<(u32, u32)> {
             let j = j as usize;
             let reach = loose[i].reach.min(loose[j].reach);
             if j > i && distance(&p, &position(j)) <= reach {
-                let (a, b) = (find(&mut leader, i), find(&mut leader, j));
-                leader[a.max(b)] = a.min(b);
+                groups.join(i, j);
             }
         }
     }
     let mut group: Vec<(u32, u32)> =
-        (0..loose.len()).map(|i| (loose[find(&mut leader, i)].vertex, loose[i].vertex)).collect();
+        (0..loose.len()).map(|i| (loose[groups.leader(i)].vertex, loose[i].vertex)).collect();
     group.sort_unstable();
     group
-}
-
-/// The leader of a group, with the path to it halved on the way.
-fn find(leader: &mut [usize], mut i: usize) -> usize {
-    while leader[i] != i {
-        leader[i] = leader[leader[i]];
-        i = leader[i];
-    }
-    i
 }
 
 #[cfg(test)]

@@ -259,6 +259,13 @@ proptest! {
     }
 
     #[test]
+    fn the_number_of_threads_does_not_matter(soup in tangle()) {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let alone = pool.install(|| solid_from_soup(&soup));
+        prop_assert_eq!(alone, solid_from_soup(&soup));
+    }
+
+    #[test]
     fn a_second_repair_finds_nothing_to_do(soup in tangle()) {
         let (mesh, _) = repair(weld(&soup).0);
         let (again, report) = repair(mesh.clone());

@@ -4,7 +4,7 @@
 //! the inside out (or the outside in), then infill. Fills can be run either way; their order is
 //! then improved by reversing stretches of it while that shortens the travel (2-opt).
 
-use geom::polyline::nearest_on_ring;
+use geom::polyline::{distance_to_segment, nearest_on_ring};
 use nalgebra::{Point2, Point3, distance};
 use slicer::bead::Bead;
 use slicer::toolpath::{IslandPaths, LayerPaths, Role, Station, Toolpath, WallGroup};
@@ -127,7 +127,8 @@ impl Ordering<'_> {
         self.push(begun_at(path, start));
     }
 
-    fn push(&mut self, line: OrderedLine) {
+    fn push(&mut self, mut line: OrderedLine) {
+        leave_out_short(&mut line.stations, line.role);
         if let Some(last) = line.stations.last() {
             self.nozzle = last.at.xy();
         }
@@ -147,15 +148,44 @@ fn begun_at(path: &Toolpath, start: usize) -> OrderedLine {
     OrderedLine { role: path.role, stations, island: None }
 }
 
-/// A begin on a side nearer than this to a corner moves into the corner, mm: shorter pieces strain
-/// firmwares and show nothing.
-const SHORTEST_PIECE_MM: f64 = 0.03;
+/// Pieces shorter than this strain firmwares and show nothing, mm.
+const SHORTEST_PIECE_MM: f64 = 0.02;
+
+/// How far a wall may move for the sake of a short piece, mm; as much as it may be off between two
+/// points of the program anyway. Infill may move as far as the piece is long.
+const SHORT_PIECE_TOLERANCE_MM: f64 = 0.005;
+
+/// Leaves out stations that end a piece too short to matter, where the line hardly moves for it and
+/// the bead stays the same.
+fn leave_out_short(stations: &mut Vec<Station>, role: Role) {
+    let tolerance = match role {
+        Role::ExternalPerimeter | Role::Perimeter => SHORT_PIECE_TOLERANCE_MM,
+        _ => SHORTEST_PIECE_MM,
+    };
+    let mut kept: Vec<Station> = Vec::with_capacity(stations.len());
+    for (i, station) in stations.iter().enumerate() {
+        let short = match (kept.last(), stations.get(i + 1)) {
+            (Some(last), Some(next)) => {
+                let (a, p, b) = (last.at.xy(), station.at.xy(), next.at.xy());
+                distance(&a, &p) < SHORTEST_PIECE_MM
+                    && distance_to_segment(&a, &b, &p) < tolerance
+                    && last.bead == station.bead
+            }
+            _ => false,
+        };
+        if !short {
+            kept.push(*station);
+        }
+    }
+    *stations = kept;
+}
 
 /// A closed line begun at the place on it nearest to `target`, on a side if need be.
 fn begun_near(path: &Toolpath, target: &Point2<f64>) -> OrderedLine {
     let points = plane(path);
     let place = nearest_on_ring(&points, target).expect("lines have points");
     for corner in [place.side, (place.side + 1) % points.len()] {
+        // A begin this near to a corner moves into it.
         if distance(&points[corner], &place.at) < SHORTEST_PIECE_MM {
             return begun_at(path, corner);
         }
@@ -293,6 +323,19 @@ mod tests {
     fn ordered(layer: &LayerPaths, external_first: bool) -> Vec<OrderedLine> {
         let params = OrderParams { seam: SeamPosition::Nearest, external_first };
         order(layer, Point2::origin(), &mut SeamMemory::default(), &params)
+    }
+
+    #[test]
+    fn short_pieces_go_unless_the_line_would_move() {
+        let stations = |points: &[[f64; 2]]| line(points, Role::Perimeter, false).stations;
+        let mut straight = stations(&[[0.0, 0.0], [0.01, 0.001], [5.0, 0.0]]);
+        leave_out_short(&mut straight, Role::Perimeter);
+        assert_eq!(straight.len(), 2);
+        let mut notch = stations(&[[0.0, 0.0], [0.0, 0.015], [5.0, 0.0]]);
+        leave_out_short(&mut notch, Role::Perimeter);
+        assert_eq!(notch.len(), 3);
+        leave_out_short(&mut notch, Role::SolidInfill);
+        assert_eq!(notch.len(), 2);
     }
 
     #[test]

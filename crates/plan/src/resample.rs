@@ -168,12 +168,17 @@ impl Resampler {
 
     /// A stroke that moves the lift or the filament only.
     fn standing(&mut self, stroke: &Stroke, z: f64, legs: &mut Vec<Leg>) {
-        let path = if stroke.kind == Kind::Filament { 0.0 } else { (z - self.joints.z).abs() };
-        self.joints.z = z;
+        let to = self.params.dialect.rounded_joints(&Joints { z, ..self.joints });
+        let path = if stroke.kind == Kind::Filament { 0.0 } else { (to.z - self.joints.z).abs() };
+        if path == 0.0 && stroke.filament == 0.0 {
+            return;
+        }
+        self.joints = to;
+        self.at_part = self.alignment.part_from_joints(&to);
         legs.push(Leg {
             kind: stroke.kind,
-            to: self.joints,
-            at: self.alignment.part_from_joints(&self.joints),
+            to,
+            at: self.at_part,
             filament: stroke.filament,
             path,
             speed: stroke.speed,
@@ -380,13 +385,18 @@ impl Resampler {
             && self.reaches_run(strokes, index, self.branch.opposite())
     }
 
-    /// Whether the rail reaches the end of stroke `index` and of all that is printed after it
-    /// without a break from one side.
+    /// Whether the rail reaches the end of stroke `index`, and of all that follows up to the next
+    /// travel across the bed, from one side.
     fn reaches_run(&self, strokes: &[Stroke], index: usize, branch: Branch) -> bool {
         if branch == Branch::Near {
             return true;
         }
-        let run = strokes[index + 1..].iter().take_while(|stroke| stroke.kind == Kind::Print);
+        let mut from = strokes[index].to.xy();
+        let run = strokes[index + 1..].iter().take_while(|stroke| {
+            let crosses = stroke.kind == Kind::Travel && stroke.to.xy() != from;
+            from = stroke.to.xy();
+            !crosses
+        });
         std::iter::once(&strokes[index]).chain(run).all(|stroke| {
             let at = Rotation2d(self.params.azimuth).turn(&stroke.to);
             self.alignment.over_bed(&at.xy()).norm() <= self.far_reach
@@ -518,10 +528,12 @@ mod tests {
     fn the_far_side_is_left_when_the_next_run_is_out_of_its_reach() {
         let mut resampler = Resampler::new(&printer(), PARAMS);
         legs(&mut resampler, &[travel(0.0, 15.0)]);
-        let strokes = [travel(-10.0, 0.0), print(10.0, 0.0), travel(12.0, 1.0), print(60.0, 1.0)];
+        let prime = Stroke { kind: Kind::Filament, ..travel(12.0, 1.0) };
+        let strokes =
+            [travel(-10.0, 0.0), print(10.0, 0.0), travel(12.0, 1.0), prime, print(60.0, 1.0)];
         let all = resampler.legs(&strokes).unwrap();
         assert!(all[1].iter().all(|leg| leg.to.s < 0.0));
-        assert!(all[3].iter().all(|leg| leg.to.s > 0.0));
+        assert!(all[4].iter().all(|leg| leg.to.s > 0.0));
         for leg in all.iter().flatten() {
             assert!(leg.to.s >= -25.0);
         }

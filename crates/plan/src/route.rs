@@ -6,6 +6,7 @@
 use geom::region::Region;
 use machine::program::{self, Layer, Step};
 use nalgebra::{Point3, distance};
+use slicer::bead::Bead;
 use slicer::toolpath::{LayerPaths, Role, Station};
 
 use crate::order::OrderedLine;
@@ -272,7 +273,7 @@ impl Router {
     ) {
         let wanted = speeds.of(line.role, is_first_layer);
         let mut told_width = f64::NAN;
-        for pair in line.stations.windows(2) {
+        for pair in line.stations.windows(2).flat_map(|pair| in_even_pieces(&pair[0], &pair[1])) {
             let (width, area) = mean(&pair[0], &pair[1]);
             let drift = (width - told_width).abs();
             if drift.is_nan() || drift > WIDTH_DRIFT * told_width {
@@ -287,6 +288,39 @@ impl Router {
         self.last_line = line.stations.iter().map(|station| station.at).collect();
     }
 }
+
+/// Cuts a piece along which the bead changes so that each part can be laid with one width.
+fn in_even_pieces(a: &Station, b: &Station) -> Vec<[Station; 2]> {
+    if a.at == b.at {
+        return Vec::new();
+    }
+    let steps = ((b.bead.width - a.bead.width).abs() / LARGEST_WIDTH_STEP_MM).ceil();
+    let steps = steps.min(((b.at - a.at).norm() / LEAST_PIECE_MM).floor()).max(1.0);
+    let between = |k: f64| {
+        let share = k / steps;
+        let blend = |from: f64, to: f64| from + (to - from) * share;
+        Station {
+            at: Point3::from(a.at.coords.lerp(&b.at.coords, share)),
+            bead: Bead {
+                width: blend(a.bead.width, b.bead.width),
+                thickness: blend(a.bead.thickness, b.bead.thickness),
+            },
+        }
+    };
+    (0..steps as u32)
+        .map(|k| {
+            let last = f64::from(k + 1) == steps;
+            [between(f64::from(k)), if last { *b } else { between(f64::from(k + 1)) }]
+        })
+        .collect()
+}
+
+/// The most that the width of a bead changes within a move, mm: half of that is how far a bead of
+/// the mean width may stick out of a place that tapers.
+const LARGEST_WIDTH_STEP_MM: f64 = 0.03;
+
+/// Pieces of a tapering line are not cut shorter than this, mm: no firmware likes shorter ones.
+const LEAST_PIECE_MM: f64 = 0.05;
 
 /// Mean width and cross-section between two stations.
 fn mean(a: &Station, b: &Station) -> (f64, f64) {
@@ -310,7 +344,6 @@ mod tests {
     use super::*;
     use geom::region::Fill;
     use nalgebra::Point2;
-    use slicer::bead::Bead;
     use slicer::toolpath::IslandPaths;
 
     const BEAD: Bead = Bead { width: 0.45, thickness: 0.2 };

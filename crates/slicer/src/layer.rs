@@ -122,7 +122,10 @@ fn fill_island(
     let groups = walls.groups.iter().map(|group| {
         let loops = group.iter().map(|wall| {
             let role = if wall.depth == 0 { Role::ExternalPerimeter } else { Role::Perimeter };
-            lift.line(&wall.points, wall.bead, role, true)
+            let station =
+                |(at, bead): &(Point2<f64>, Bead)| Station { at: lift.point(at), bead: *bead };
+            let stations = wall.points.iter().map(station).collect();
+            Toolpath { role, closed: true, stations }
         });
         WallGroup { loops: loops.collect() }
     });
@@ -136,7 +139,11 @@ fn single_beads(
     lost: &mut LostArea,
 ) -> Vec<Toolpath> {
     let thickness = lift.level.thickness();
-    axes(&place.region, &params.thin, lost)
+    let least = match place.role {
+        Role::ExternalPerimeter => params.thin.least_width,
+        _ => params.thin.least_gap,
+    };
+    axes(&place.region, least, params.thin.greatest_width, lost)
         .into_iter()
         .map(|axis| {
             let station = |p: crate::thin::AxisPoint| {

@@ -18,13 +18,13 @@ impl Level {
     /// Returns the level at which the mesh is cut.
     #[must_use]
     pub fn middle(&self) -> f64 {
-        f64::midpoint(self.lower, self.upper)
+        on_grid(f64::midpoint(self.lower, self.upper))
     }
 
     /// Returns the difference of the two levels.
     #[must_use]
     pub fn thickness(&self) -> f64 {
-        self.upper - self.lower
+        on_grid(self.upper - self.lower)
     }
 }
 
@@ -42,12 +42,21 @@ pub struct ScheduleParams {
 pub fn schedule(top: f64, params: &ScheduleParams) -> Vec<Level> {
     let bound = |i: usize| {
         // Multiplied and not added up: the hundredth layer is as exact as the first.
-        if i == 0 { 0.0 } else { params.first_layer_height + params.layer_height * (i - 1) as f64 }
+        let above_first = params.layer_height * i.saturating_sub(1) as f64;
+        if i == 0 { 0.0 } else { on_grid(params.first_layer_height + above_first) }
     };
     (0..)
         .map(|index| Level { index, lower: bound(index), upper: bound(index + 1) })
         .take_while(|level| level.middle() < top)
         .collect()
+}
+
+/// The level without the noise of its last bits: 17 × 0.2 is 3.4 and not 3.4000000000000004. A flat
+/// face of the part that lies exactly on a middle must be told apart from one that lies beside it,
+/// by us and by whoever checks the result.
+fn on_grid(level: f64) -> f64 {
+    const PER_MM: f64 = 1e6;
+    (level * PER_MM).round() / PER_MM
 }
 
 /// Returns how many layers [`schedule`] would return, as a real number: a check for users' input
@@ -82,6 +91,8 @@ mod tests {
             schedule(200.0, &ScheduleParams { first_layer_height: 0.3, layer_height: 0.2 });
         assert!(levels.windows(2).all(|pair| pair[0].upper == pair[1].lower));
         assert!((levels.last().unwrap().upper - 199.9).abs() < 1e-9);
+        assert_eq!(levels[17].thickness(), 0.2);
+        assert_eq!(levels[17].middle(), 3.6);
         let params = ScheduleParams { first_layer_height: 0.3, layer_height: 0.2 };
         assert!((expected_count(200.0, &params) - levels.len() as f64).abs() < 1.0);
     }

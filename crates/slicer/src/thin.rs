@@ -21,8 +21,11 @@ use crate::toolpath::LostArea;
 /// The widths that a single bead may have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThinParams {
-    /// Places thinner than this stay empty, mm.
+    /// Outer places thinner than this stay empty, mm.
     pub least_width: f64,
+    /// Gaps between beads thinner than this stay empty, mm. Neighbours hold such a bead in place,
+    /// so it may be thinner than one that stands alone.
+    pub least_gap: f64,
     /// The widest bead that is laid, mm.
     pub greatest_width: f64,
 }
@@ -34,29 +37,35 @@ pub(crate) struct AxisPoint {
     pub(crate) width: f64,
 }
 
-/// Distance of points on the densified rings, mm: as the thinnest bead is wide, so that sides of the
-/// triangulation cross from rim to rim and not along it.
-const RIM_STEP_MM: f64 = 0.2;
+/// Distance of points on the densified rings, mm: about as the thinnest bead is wide, so that sides
+/// of the triangulation cross from rim to rim and not along it.
+const RIM_STEP_MM: f64 = 0.12;
 
 /// How much an axis may be simplified, mm, in place and in half its width alike.
 const AXIS_TOLERANCE_MM: f64 = 0.01;
 
+/// A branch shorter than this many widths of the place at its hub leads into a corner: half a width
+/// is what the hub's own disc covers, and the bead that ends at the hub covers as much again.
+const SHORT_BRANCH_IN_WIDTHS: f64 = 1.5;
+
 /// Beads shorter than this many widths are blobs.
 const LEAST_LENGTH_IN_WIDTHS: f64 = 1.0;
 
-/// Returns the axes of the thin places of `region` and counts what no bead fits in.
+/// Returns the axes of the thin places of `region` where a bead from `least` to `greatest` mm wide
+/// fits, and counts what none fits in.
 pub(crate) fn axes(
     region: &Region,
-    params: &ThinParams,
+    least: f64,
+    greatest: f64,
     lost: &mut LostArea,
 ) -> Vec<Vec<AxisPoint>> {
     // Corners beside walls taper to nothing: an opening of the least width removes them, and with
     // them the triangles that would cost most.
-    let wide_enough = region.opened(params.least_width / 2.0);
-    lost.add(&region.difference(&wide_enough.outset(params.least_width / 2.0)));
+    let wide_enough = region.opened(least / 2.0);
+    lost.add(&region.difference(&wide_enough.outset(least / 2.0)));
     let mut found = Vec::new();
     for island in wide_enough.islands() {
-        let axes = axes_of_island(island, params);
+        let axes = axes_of_island(island, least, greatest);
         if axes.is_empty() {
             lost.add(&Region::from_island(island.clone()));
         }
@@ -65,7 +74,7 @@ pub(crate) fn axes(
     found
 }
 
-fn axes_of_island(island: &Island, params: &ThinParams) -> Vec<Vec<AxisPoint>> {
+fn axes_of_island(island: &Island, least: f64, greatest: f64) -> Vec<Vec<AxisPoint>> {
     let rings: Vec<Vec<Point2<f64>>> = island.iter().map(|ring| densified(ring)).collect();
     // Rings of a region never cross, so this fails only on rings that touch along a side within a
     // grid step; such a sliver has no axis worth laying.
@@ -82,7 +91,7 @@ fn axes_of_island(island: &Island, params: &ThinParams) -> Vec<Vec<AxisPoint>> {
     graph
         .branches()
         .into_iter()
-        .flat_map(|branch| printable_pieces(&branch, params))
+        .flat_map(|branch| printable_pieces(&branch, least, greatest))
         .map(|piece| simplified(&piece))
         .filter(|piece| {
             let length: f64 = piece.windows(2).map(|w| distance(&w[0].at, &w[1].at)).sum();
@@ -212,7 +221,7 @@ impl AxisGraph {
         }
     }
 
-    /// Cuts off branches from a hub to an end that are shorter than the place is wide at the hub.
+    /// Cuts off branches from a hub to an end that only lead into a corner.
     fn prune(&mut self) {
         for end in 0..self.nodes.len() {
             if self.links[end].len() != 1 {
@@ -230,7 +239,7 @@ impl AxisGraph {
                 path.push(next);
                 at = next;
             }
-            if self.links[at].len() >= 3 && length < self.nodes[at].width {
+            if self.links[at].len() >= 3 && length < SHORT_BRANCH_IN_WIDTHS * self.nodes[at].width {
                 for pair in path.windows(2) {
                     self.links[pair[0]].retain(|&n| n != pair[1]);
                     self.links[pair[1]].retain(|&n| n != pair[0]);
@@ -241,13 +250,13 @@ impl AxisGraph {
 }
 
 /// The pieces of an axis where the place is wide enough for a bead, widths capped.
-fn printable_pieces(line: &[AxisPoint], params: &ThinParams) -> Vec<Vec<AxisPoint>> {
+fn printable_pieces(line: &[AxisPoint], least: f64, greatest: f64) -> Vec<Vec<AxisPoint>> {
     // A shade below the least width: an opening leaves places of just that width.
-    let least = params.least_width * 0.99;
+    let least = least * 0.99;
     line.chunk_by(|a, b| (a.width >= least) == (b.width >= least))
         .filter(|piece| piece[0].width >= least && piece.len() >= 2)
         .map(|piece| {
-            let cap = |p: &AxisPoint| AxisPoint { width: p.width.min(params.greatest_width), ..*p };
+            let cap = |p: &AxisPoint| AxisPoint { width: p.width.min(greatest), ..*p };
             piece.iter().map(cap).collect()
         })
         .collect()
@@ -274,7 +283,9 @@ mod tests {
     use geom::region::Fill;
     use std::f64::consts::TAU;
 
-    const PARAMS: ThinParams = ThinParams { least_width: 0.2, greatest_width: 0.8 };
+    fn axes(region: &Region, lost: &mut LostArea) -> Vec<Vec<AxisPoint>> {
+        super::axes(region, 0.2, 0.8, lost)
+    }
 
     fn polygon(points: &[[f64; 2]]) -> Region {
         let ring: Vec<Point2<f64>> = points.iter().map(|&p| Point2::from(p)).collect();
@@ -296,7 +307,7 @@ mod tests {
     #[test]
     fn a_strip_has_one_line_down_its_middle() {
         let strip = polygon(&[[0.0, 0.0], [12.0, 0.0], [12.0, 0.5], [0.0, 0.5]]);
-        let lines = axes(&strip, &PARAMS, &mut LostArea::default());
+        let lines = axes(&strip, &mut LostArea::default());
         assert_eq!(lines.len(), 1);
         assert!(lines[0].len() <= 12, "{} points on a straight line", lines[0].len());
         assert!(length(&lines[0]) > 11.3 && length(&lines[0]) <= 12.1, "{}", length(&lines[0]));
@@ -311,7 +322,7 @@ mod tests {
     fn a_wedge_is_filled_where_a_bead_fits() {
         let wedge = polygon(&[[0.0, 0.0], [20.0, -0.35], [20.0, 0.35]]);
         let mut lost = LostArea::default();
-        let lines = axes(&wedge, &PARAMS, &mut lost);
+        let lines = axes(&wedge, &mut lost);
         assert_eq!(lines.len(), 1);
         let narrowest = lines[0].iter().map(|p| p.width).fold(f64::INFINITY, f64::min);
         assert!((0.19..0.25).contains(&narrowest), "{narrowest}");
@@ -332,7 +343,7 @@ mod tests {
                 .collect()
         };
         let ring = polygon(&circle(5.2)).difference(&polygon(&circle(4.8)));
-        let lines = axes(&ring, &PARAMS, &mut LostArea::default());
+        let lines = axes(&ring, &mut LostArea::default());
         let total: f64 = lines.iter().map(|line| length(line)).sum();
         assert!((total - TAU * 5.0).abs() < 0.3, "{total}");
     }
@@ -341,7 +352,7 @@ mod tests {
     fn a_cross_of_strips_keeps_its_four_arms() {
         let across = polygon(&[[-6.0, -0.2], [6.0, -0.2], [6.0, 0.2], [-6.0, 0.2]]);
         let along = polygon(&[[-0.2, -6.0], [0.2, -6.0], [0.2, 6.0], [-0.2, 6.0]]);
-        let lines = axes(&across.union(&along), &PARAMS, &mut LostArea::default());
+        let lines = axes(&across.union(&along), &mut LostArea::default());
         let total: f64 = lines.iter().map(|line| length(line)).sum();
         assert!((total - 23.5).abs() < 1.0, "{total}");
     }
@@ -350,7 +361,7 @@ mod tests {
     fn what_no_bead_fits_in_is_counted() {
         let hair = polygon(&[[0.0, 0.0], [12.0, 0.0], [12.0, 0.1], [0.0, 0.1]]);
         let mut lost = LostArea::default();
-        assert!(axes(&hair, &PARAMS, &mut lost).is_empty());
+        assert!(axes(&hair, &mut lost).is_empty());
         assert!((lost.area - 1.2).abs() < 1e-6);
         assert!(lost.worst.is_some());
     }

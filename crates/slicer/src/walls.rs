@@ -9,11 +9,13 @@
 //!
 //! Where what is left is thinner than two spacings, two beads do not fit side by side: such places
 //! are taken out and handed to [`thin`](crate::thin), which lays a single bead of the width there
-//! is. An inset tells for nothing whether there are any, so parts without thin places pay nothing.
+//! is. Outermost walls are let through somewhat narrower places, so that outlines stay closed; in
+//! these *tight* places their beads overlap and feed only what the place holds. An inset tells for
+//! nothing whether there are any such places, so parts without them pay nothing.
 
 use geom::grid::mm;
 use geom::polyline::nearest_on_ring;
-use geom::region::{Island, Region, Ring, ring_length, signed_area};
+use geom::region::{Island, Part, Region, Ring, ring_length, ring_sides, signed_area};
 use nalgebra::Point2;
 
 use crate::bead::Bead;
@@ -35,10 +37,14 @@ pub struct WallParams {
 pub struct WallLoop {
     /// 0 for the outermost wall, then inwards.
     pub depth: usize,
-    /// The centreline, mm, material to the left.
-    pub points: Vec<Point2<f64>>,
-    /// The bead.
-    pub bead: Bead,
+    /// The centreline, mm, material to the left, and the bead at each point.
+    pub points: Vec<(Point2<f64>, Bead)>,
+}
+
+impl WallLoop {
+    fn positions(&self) -> Vec<Point2<f64>> {
+        self.points.iter().map(|(at, _)| *at).collect()
+    }
 }
 
 /// A place too thin for two beads side by side.
@@ -84,18 +90,29 @@ pub fn walls(island: &Region, thickness: f64, params: &WallParams) -> Walls {
             _ => (params.width, Role::GapFill),
         };
         let bead = Bead { width, thickness };
-        let left = split_thin(&walls.interior, bead.spacing());
+        let spacing = bead.spacing();
+        let least_pair = match depth {
+            0 => width + LEAST_PAIR_SHARE * spacing,
+            _ => 2.0 * spacing,
+        };
+        let left = split(&walls.interior, spacing, least_pair);
         if !left.thin.is_empty() {
             walls.thin.push(ThinPlace { region: left.thin, role });
         }
-        for ring in centreline(&left.thick, depth, params, thickness).rings() {
-            let points = ring.iter().map(|&p| mm(p)).collect();
-            add_to_group(&mut walls.groups, WallLoop { depth, points, bead }, is_hole(ring));
+        let lines = centreline(&left.thick, depth, params, thickness);
+        let tight = TightBeads::new(&left.tight, &lines, bead);
+        for ring in lines.rings() {
+            let wall = WallLoop { depth, points: tight.along(ring, bead) };
+            add_to_group(&mut walls.groups, wall, width, is_hole(ring));
         }
         walls.interior = left.core.thinned(INNER_TOLERANCE_MM);
     }
     walls
 }
+
+/// How near two outermost beads may lie, as a share of their spacing. Nearer, and a single wide
+/// bead is better; PrusaSlicer's classic walls allow the same overlap.
+const LEAST_PAIR_SHARE: f64 = 0.6;
 
 fn is_hole(ring: &Ring) -> bool {
     signed_area(ring) < 0.0
@@ -115,8 +132,10 @@ fn centreline(left: &Region, depth: usize, params: &WallParams, thickness: f64) 
 
 /// A region taken apart by thickness.
 pub(crate) struct Split {
-    /// At least twice the spacing thick.
+    /// Where two beads are laid side by side.
     pub(crate) thick: Region,
+    /// The part of it that is thinner than two spacings.
+    tight: Region,
     /// The rest: places where a single bead may fit.
     pub(crate) thin: Region,
     /// What is farther than the spacing from the border of `thick`.
@@ -125,27 +144,52 @@ pub(crate) struct Split {
 
 /// How closely the border of thin places is known, mm. They are found by shrinking the region and
 /// growing it again, and arcs simplified this far cost a fraction of exact ones; a bead that ends
-/// 20 µm sooner or later is the same bead.
-const THIN_BORDER_MM: f64 = 0.02;
+/// 10 µm sooner or later is the same bead.
+const THIN_BORDER_MM: f64 = 0.01;
 
-/// Thin places into which no disc of this radius (mm) fits are the sharp corners of thick ones.
-const CORNER_RADIUS_MM: f64 = 0.09;
+/// Thin places into which no disc of this radius (mm) fits are what acute corners of thick ones
+/// leave over, or too thin for any bead.
+const CORNER_RADIUS_MM: f64 = 0.04;
 
 /// Takes the places thinner than twice `spacing` out of a region.
 pub(crate) fn split_thin(region: &Region, spacing: f64) -> Split {
+    split(region, spacing, 2.0 * spacing)
+}
+
+/// Takes the places thinner than `least_pair` out of a region; those thinner than twice `spacing`
+/// are tight.
+fn split(region: &Region, spacing: f64, least_pair: f64) -> Split {
     let (core, loss) = region.inset_with_loss(spacing);
-    let whole = |core| Split { thick: region.clone(), thin: Region::default(), core };
+    let whole = |core| Split {
+        thick: region.clone(),
+        tight: Region::default(),
+        thin: Region::default(),
+        core,
+    };
     if loss <= NEGLIGIBLE_LOSS_MM2 {
         return whole(core);
     }
-    let reached = core.thinned(THIN_BORDER_MM).outset(spacing + 2.0 * THIN_BORDER_MM);
-    let thin = region.difference(&reached).filtered(holds_a_disc);
-    if thin.is_empty() {
+    let narrow = out_of_reach(region, &core, spacing);
+    if narrow.is_empty() {
         return whole(core);
     }
+    let (thin, tight) = if least_pair < 2.0 * spacing {
+        let half = least_pair / 2.0;
+        let thin = out_of_reach(region, &region.inset(half), half);
+        let tight = narrow.difference(&thin).filtered(holds_a_disc);
+        (thin, tight)
+    } else {
+        (narrow, Region::default())
+    };
     let thick = region.difference(&thin);
     let core = thick.inset(spacing);
-    Split { thick, thin, core }
+    Split { thick, tight, thin, core }
+}
+
+/// The places of a region that its inset does not reach when it grows by `distance` again.
+fn out_of_reach(region: &Region, inset: &Region, distance: f64) -> Region {
+    let reached = inset.thinned(THIN_BORDER_MM).outset_sharp(distance + 2.0 * THIN_BORDER_MM);
+    region.difference(&reached).filtered(holds_a_disc)
 }
 
 fn holds_a_disc(island: &&Island) -> bool {
@@ -159,23 +203,86 @@ fn holds_a_disc(island: &&Island) -> bool {
 }
 
 /// Puts a loop behind the one that it follows: the nearest of the wall before, of its own kind.
-fn add_to_group(groups: &mut Vec<Vec<WallLoop>>, added: WallLoop, is_hole: bool) {
-    let start = added.points[0];
+fn add_to_group(groups: &mut Vec<Vec<WallLoop>>, added: WallLoop, width: f64, is_hole: bool) {
+    let start = added.points[0].0;
     let nearest = groups
         .iter()
         .enumerate()
         .filter_map(|(index, group)| {
             let last = group.last()?;
-            let same_kind = area_sign(&last.points) == if is_hole { -1.0 } else { 1.0 };
+            let line = last.positions();
+            let same_kind = area_sign(&line) == if is_hole { -1.0 } else { 1.0 };
             let follows = last.depth + 1 == added.depth && same_kind;
-            let distance = nearest_on_ring(&last.points, &start)?.distance;
+            let distance = nearest_on_ring(&line, &start)?.distance;
             follows.then_some((distance, index))
         })
         .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     match nearest {
         // A wall that splits in two behind a neck leaves one part to start a group of its own.
-        Some((distance, index)) if distance < 2.0 * added.bead.width => groups[index].push(added),
+        Some((distance, index)) if distance < 2.0 * width => groups[index].push(added),
         _ => groups.push(vec![added]),
+    }
+}
+
+/// The beads of a wall in tight places: all that is laid in a place has just its volume.
+struct TightBeads {
+    places: Vec<(Region, Bead)>,
+}
+
+impl TightBeads {
+    /// `lines` are all centrelines that run through the places.
+    fn new(tight: &Region, lines: &Region, bead: Bead) -> Self {
+        let places = tight
+            .islands()
+            .iter()
+            .map(|island| {
+                let place = Region::from_island(island.clone());
+                let length: f64 = lines
+                    .rings()
+                    .flat_map(|ring| ring_sides(ring))
+                    .flat_map(|(a, b)| place.parts(&mm(a), &mm(b)))
+                    .filter(|part| part.inside)
+                    .map(|part| part.length())
+                    .sum();
+                let share = place.area() / length;
+                // A line that only clips the corner of a place is not to blame for its area.
+                let spacing = share.clamp(bead.spacing() / 2.0, bead.spacing());
+                (place, Bead::with_spacing(spacing, bead.thickness))
+            })
+            .collect();
+        Self { places }
+    }
+
+    /// The points of a centreline with their beads; where the bead changes there are two.
+    fn along(&self, ring: &Ring, bead: Bead) -> Vec<(Point2<f64>, Bead)> {
+        let mut points: Vec<(Point2<f64>, Bead)> = Vec::with_capacity(ring.len());
+        for (a, b) in ring_sides(ring) {
+            let mut pieces = vec![(Part { from: mm(a), to: mm(b), inside: false }, bead)];
+            for (place, narrow) in &self.places {
+                pieces = pieces
+                    .into_iter()
+                    .flat_map(|(piece, old)| {
+                        place.parts(&piece.from, &piece.to).into_iter().map(move |part| {
+                            let bead = if part.inside { *narrow } else { old };
+                            (part, bead)
+                        })
+                    })
+                    .collect();
+            }
+            for (piece, bead) in pieces {
+                let continues = points.last().is_some_and(|(_, last)| *last == bead);
+                if !continues && !points.is_empty() {
+                    points.push((piece.from, bead));
+                }
+                if points.is_empty() {
+                    points.push((piece.from, bead));
+                }
+                points.push((piece.to, bead));
+            }
+        }
+        // The last piece ends where the first begins.
+        points.pop();
+        points
     }
 }
 
@@ -200,8 +307,16 @@ mod tests {
         polygon(&[[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
     }
 
-    fn length(points: &[Point2<f64>]) -> f64 {
-        geom::polyline::length(points) + (points[0] - points[points.len() - 1]).norm()
+    /// Area that a loop's beads take.
+    fn taken(wall: &WallLoop) -> f64 {
+        let next = wall.points.iter().cycle().skip(1);
+        wall.points
+            .iter()
+            .zip(next)
+            .map(|((a, bead), (b, other))| {
+                (b - a).norm() * f64::midpoint(bead.spacing(), other.spacing())
+            })
+            .sum()
     }
 
     #[test]
@@ -210,8 +325,7 @@ mod tests {
         let walls = walls(&island, 0.2, &PARAMS);
         assert_eq!(walls.groups.len(), 1);
         assert!(walls.thin.is_empty());
-        let laid: f64 =
-            walls.groups.iter().flatten().map(|w| length(&w.points) * w.bead.spacing()).sum();
+        let laid: f64 = walls.groups.iter().flatten().map(taken).sum();
         let missing = island.area() - laid - walls.interior.area();
         // The round flank of the outer bead moves loops 21 µm inwards, which at four corners and
         // two walls leaves 0.14 mm² of 400.
@@ -223,13 +337,13 @@ mod tests {
         let walls = walls(&rectangle(20.0, 10.0), 0.2, &PARAMS);
         let outer = &walls.groups[0][0];
         assert_eq!(outer.depth, 0);
-        for p in &outer.points {
+        for p in &outer.positions() {
             let from_side = (p.x.min(20.0 - p.x)).min(p.y.min(10.0 - p.y));
             assert!((from_side - 0.225).abs() < 1e-5);
         }
-        let gap =
-            walls.groups[0][1].points.iter().map(|p| p.x).fold(f64::INFINITY, f64::min) - 0.225;
-        assert!((gap - outer.bead.spacing()).abs() < 1e-5, "{gap}");
+        let inner = walls.groups[0][1].positions();
+        let gap = inner.iter().map(|p| p.x).fold(f64::INFINITY, f64::min) - 0.225;
+        assert!((gap - outer.points[0].1.spacing()).abs() < 1e-5, "{gap}");
     }
 
     #[test]
@@ -242,7 +356,7 @@ mod tests {
         ]));
         let walls = walls(&frame, 0.2, &PARAMS);
         assert_eq!(walls.groups.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2]);
-        let sign = |k: usize| area_sign(&walls.groups[k][0].points);
+        let sign = |k: usize| area_sign(&walls.groups[k][0].positions());
         assert_eq!(sign(0) * sign(1), -1.0);
     }
 
@@ -265,8 +379,32 @@ mod tests {
         assert_eq!(external.len(), 1);
         let area = external[0].region.area();
         assert!((area - 0.6 * 8.0).abs() < 0.5, "{area}");
-        let reach = walls.groups[0][0].points.iter().map(|p| p.x).fold(0.0, f64::max);
+        let outer = walls.groups[0][0].positions();
+        let reach = outer.iter().map(|p| p.x).fold(0.0, f64::max);
         assert!(reach < 11.5, "the wall ends where the fin begins, not at {reach}");
+    }
+
+    #[test]
+    fn tight_places_keep_a_closed_wall_and_their_volume() {
+        // 0.75 mm hold two outer beads only when they overlap.
+        for (width, height) in [(30.0, 0.75), (30.0, 0.8), (12.0, 0.72)] {
+            let strip = rectangle(width, height);
+            let walls = walls(&strip, 0.2, &PARAMS);
+            assert!(walls.thin.is_empty() && walls.interior.is_empty());
+            assert_eq!(walls.groups.len(), 1);
+            let taken: f64 = walls.groups.iter().flatten().map(taken).sum();
+            let ratio = taken / strip.area();
+            assert!((ratio - 1.0).abs() < 0.03, "{height}: {ratio}");
+        }
+        // A neck in an otherwise thick part: the wall runs through it in one.
+        let dumbbell = rectangle(10.0, 10.0)
+            .union(&polygon(&[[20.0, 0.0], [30.0, 0.0], [30.0, 10.0], [20.0, 10.0]]))
+            .union(&polygon(&[[9.0, 4.6], [21.0, 4.6], [21.0, 5.35], [9.0, 5.35]]));
+        let walls = walls(&dumbbell, 0.2, &PARAMS);
+        assert_eq!(walls.groups.iter().filter(|group| group[0].depth == 0).count(), 1);
+        let outer = &walls.groups[0][0];
+        let narrow = outer.points.iter().filter(|(p, _)| (12.0..18.0).contains(&p.x));
+        assert!(narrow.clone().all(|(_, bead)| bead.width < 0.44));
     }
 
     #[test]

@@ -30,6 +30,8 @@ pub(super) struct Faces {
     pub(super) normals: Vec<Vector3<f64>>,
     pub(super) areas_mm2: Vec<f64>,
     pub(super) total_mm2: f64,
+    /// Diagonal of the box around the mesh, mm.
+    pub(super) diagonal: f64,
 }
 
 impl Faces {
@@ -43,7 +45,7 @@ impl Faces {
             })
             .unzip();
         let total_mm2 = areas_mm2.iter().sum();
-        Self { normals, areas_mm2, total_mm2 }
+        Self { normals, areas_mm2, total_mm2, diagonal: mesh.bounds().diagonal() }
     }
 }
 

@@ -20,6 +20,7 @@
 use super::footprint;
 use crate::measure;
 use crate::mesh::Mesh;
+use geom::circle::Circle;
 use nalgebra::Complex;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -45,119 +46,133 @@ const CHUNK: usize = 1 << 14;
 /// Parts with a symmetry about z have several such directions, of which any may be returned.
 #[must_use]
 pub fn reference_azimuth(mesh: &Mesh) -> f64 {
-    let azimuth = [LOW, HIGH].into_iter().find_map(|n| Harmonics::of(mesh, n).azimuth());
-    azimuth.map_or(0.0, |azimuth| {
-        let turn = azimuth.rem_euclid(TAU);
-        if turn > TAU / 2.0 { turn - TAU } else { turn }
-    })
+    let Some(surface) = Surface::of(mesh) else { return 0.0 };
+    let find = |n: usize, weight: Weight| lowest(&surface.harmonics(n, weight));
+    let found = find(LOW, Weight::Area)
+        .or_else(|| find(LOW, Weight::Height))
+        .or_else(|| find(HIGH, Weight::Area));
+    let Some((k, harmonic)) = found else { return 0.0 };
+    let directions = (0..k).map(|j| (harmonic.arg() + TAU * f64::from(j)) / f64::from(k));
+    let turn = surface.choose(directions.collect()).rem_euclid(TAU);
+    if turn > TAU / 2.0 { turn - TAU } else { turn }
 }
 
-const ZERO: Complex<f64> = Complex::new(0.0, 0.0);
-
-/// The harmonics 1 … n of a surface about the centre of its footprint.
-struct Harmonics {
-    area: f64,
-    /// The integrals of z^k.
-    plain: Vec<Complex<f64>>,
-    /// The integrals of z^k times the height, which runs from −1 to 1.
-    by_height: Vec<Complex<f64>>,
+/// The lowest harmonic to speak of, with its number.
+fn lowest(harmonics: &[Complex<f64>]) -> Option<(u32, Complex<f64>)> {
+    (1..).zip(harmonics.iter().copied()).find(|(_, harmonic)| harmonic.norm() > LEAST)
 }
 
-impl Harmonics {
-    fn zero(n: usize) -> Self {
-        Self { area: 0.0, plain: vec![ZERO; n], by_height: vec![ZERO; n] }
-    }
+/// What the surface is weighted by.
+#[derive(Clone, Copy, PartialEq)]
+enum Weight {
+    Area,
+    /// Area times height, which runs from −1 to 1.
+    Height,
+}
 
-    fn of(mesh: &Mesh, n: usize) -> Self {
-        let mut sum = Self::zero(n);
-        let Some(circle) = footprint(mesh).filter(|c| c.radius > 0.0) else { return sum };
+/// A surface about the axis through the centre of its footprint.
+struct Surface<'a> {
+    mesh: &'a Mesh,
+    circle: Circle,
+    middle: f64,
+    half_height: f64,
+}
+
+impl<'a> Surface<'a> {
+    fn of(mesh: &'a Mesh) -> Option<Self> {
+        let circle = footprint(mesh).filter(|circle| circle.radius > 0.0)?;
         let bounds = mesh.bounds();
         let middle = nalgebra::center(&bounds.min, &bounds.max).z;
         let half_height = (bounds.size().z / 2.0).max(f64::MIN_POSITIVE);
-        let place = |v: u32| {
-            let p = mesh.vertices[v as usize];
-            let arm = (p.xy() - circle.centre) / circle.radius;
-            (Complex::new(arm.x, arm.y), (p.z - middle) / half_height)
-        };
+        Some(Self { mesh, circle, middle, half_height })
+    }
+
+    /// Place in the complex plane, with the footprint as the unit circle, and height.
+    fn place(&self, v: u32) -> (Complex<f64>, f64) {
+        let p = self.mesh.vertices[v as usize];
+        let arm = (p.xy() - self.circle.centre) / self.circle.radius;
+        (Complex::new(arm.x, arm.y), (p.z - self.middle) / self.half_height)
+    }
+
+    /// The harmonics 1 … n.
+    fn harmonics(&self, n: usize, weight: Weight) -> Vec<Complex<f64>> {
         let of_chunk = |triangles: &[[u32; 3]]| {
-            let mut sum = Self::zero(n);
+            let mut area = 0.0;
+            let mut sums = vec![Complex::new(0.0, 0.0); n];
             for corners in triangles {
-                let area = measure::area_of(&corners.map(|v| mesh.vertices[v as usize]));
-                sum.add_triangle(corners.map(place), area);
+                let positions = corners.map(|v| self.mesh.vertices[v as usize]);
+                let places = corners.map(|v| self.place(v));
+                let own = measure::area_of(&positions);
+                area += own;
+                match weight {
+                    Weight::Area => add_plain(&mut sums, places.map(|(z, _)| z), own),
+                    Weight::Height => add_by_height(&mut sums, places, own),
+                }
             }
-            sum
+            (area, sums)
         };
-        let chunks: Vec<Self> = mesh.triangles.par_chunks(CHUNK).map(of_chunk).collect();
-        for chunk in &chunks {
-            sum.add(chunk);
-        }
-        if sum.area > 0.0 {
-            let area = sum.area;
-            sum.plain.iter_mut().chain(&mut sum.by_height).for_each(|c| *c /= area);
-        }
-        sum
+        let chunks: Vec<_> = self.mesh.triangles.par_chunks(CHUNK).map(of_chunk).collect();
+        let area: f64 = chunks.iter().map(|(area, _)| area).sum();
+        let total = |k: usize| chunks.iter().map(|(_, sums)| sums[k]).sum::<Complex<f64>>();
+        let share = if area > 0.0 { 1.0 / area } else { 0.0 };
+        (0..n).map(|k| total(k) * share).collect()
     }
 
-    fn add(&mut self, other: &Self) {
-        self.area += other.area;
-        for (a, b) in self.plain.iter_mut().zip(&other.plain) {
-            *a += b;
+    /// The direction that all low harmonics together prefer.
+    fn choose(&self, directions: Vec<f64>) -> f64 {
+        if directions.len() == 1 {
+            return directions[0];
         }
-        for (a, b) in self.by_height.iter_mut().zip(&other.by_height) {
-            *a += b;
-        }
-    }
-
-    /// Adds the integrals over a triangle, given the corners' places and heights.
-    ///
-    /// With heights ζ, that of z^k ζ is A · 2/((k+1)(k+2)(k+3)) · Σ ζ_i h_k(z₁, z₂, z₃, z_i), from
-    /// the same integral of barycentric monomials.
-    fn add_triangle(&mut self, corners: [(Complex<f64>, f64); 3], area: f64) {
-        self.area += area;
-        let [z1, z2, z3] = corners.map(|(z, _)| z);
-        // h_k of one, two, three variables: h_k(…, z) = h_k(…) + z h_{k−1}(…, z).
-        let one = Complex::new(1.0, 0.0);
-        let (mut h1, mut h2, mut h3, mut h4) = (one, one, one, [one; 3]);
-        for (k, (plain, by_height)) in (1..).zip(self.plain.iter_mut().zip(&mut self.by_height)) {
-            h1 *= z1;
-            h2 = h1 + z2 * h2;
-            h3 = h2 + z3 * h3;
-            let share = 2.0 * area / f64::from((k + 1) * (k + 2));
-            *plain += h3 * share;
-            for (h4, (z, height)) in h4.iter_mut().zip(corners) {
-                *h4 = h3 + z * *h4;
-                *by_height += *h4 * (height * share / f64::from(k + 3));
-            }
-        }
-    }
-
-    /// The direction; `None` when all harmonics are noise.
-    fn azimuth(&self) -> Option<f64> {
-        let families = [&self.plain, &self.by_height];
-        let (lowest, harmonic) = families.into_iter().find_map(|family| {
-            family.iter().enumerate().find(|(_, harmonic)| harmonic.norm() > LEAST)
-        })?;
-        let k = (lowest + 1) as f64;
-        let directions = (0..=lowest).map(|j| (harmonic.arg() + TAU * j as f64) / k);
+        let families = [Weight::Area, Weight::Height].map(|weight| self.harmonics(LOW, weight));
         let mut best: Option<(f64, Complex<f64>)> = None;
         for azimuth in directions {
-            let score = self.score(azimuth);
+            let score = families.iter().map(|family| score(family, azimuth)).sum();
             if best.is_none_or(|(_, best)| is_better(score, best)) {
                 best = Some((azimuth, score));
             }
         }
-        best.map(|(azimuth, _)| azimuth)
+        best.map_or(0.0, |(azimuth, _)| azimuth)
     }
+}
 
-    /// How well the harmonics agree with a direction (real part), and, when that is the same for
-    /// two, on which side of it they lie.
-    fn score(&self, azimuth: f64) -> Complex<f64> {
-        let seen_from = |family: &[Complex<f64>]| -> Complex<f64> {
-            let turn = |m: i32| Complex::from_polar(1.0, -f64::from(m) * azimuth);
-            (1..).zip(family).map(|(m, harmonic)| harmonic * turn(m)).sum()
-        };
-        seen_from(&self.plain) + seen_from(&self.by_height)
+/// Adds the integrals of z, z², … over a triangle of a given area.
+fn add_plain(sums: &mut [Complex<f64>], [z1, z2, z3]: [Complex<f64>; 3], area: f64) {
+    // h_k of one, two, three variables: h_k(…, z) = h_k(…) + z h_{k−1}(…, z).
+    let one = Complex::new(1.0, 0.0);
+    let (mut h1, mut h2, mut h3) = (one, one, one);
+    for (k, sum) in (1..).zip(sums) {
+        h1 *= z1;
+        h2 = h1 + z2 * h2;
+        h3 = h2 + z3 * h3;
+        *sum += h3 * (2.0 * area / f64::from((k + 1) * (k + 2)));
     }
+}
+
+/// Adds the integrals of height times z, z², … over a triangle of a given area.
+///
+/// With heights ζ that is A · 2/((k+1)(k+2)(k+3)) · Σ ζ_i h_k(z₁, z₂, z₃, z_i), from the integrals
+/// of barycentric monomials.
+fn add_by_height(sums: &mut [Complex<f64>], corners: [(Complex<f64>, f64); 3], area: f64) {
+    let [z1, z2, z3] = corners.map(|(z, _)| z);
+    let one = Complex::new(1.0, 0.0);
+    let (mut h1, mut h2, mut h3, mut h4) = (one, one, one, [one; 3]);
+    for (k, sum) in (1..).zip(sums) {
+        h1 *= z1;
+        h2 = h1 + z2 * h2;
+        h3 = h2 + z3 * h3;
+        let share = 2.0 * area / f64::from((k + 1) * (k + 2) * (k + 3));
+        for (h4, (z, height)) in h4.iter_mut().zip(corners) {
+            *h4 = h3 + z * *h4;
+            *sum += *h4 * (height * share);
+        }
+    }
+}
+
+/// How well harmonics agree with a direction (real part), and, when that is the same for two, on
+/// which side of it they lie.
+fn score(harmonics: &[Complex<f64>], azimuth: f64) -> Complex<f64> {
+    let turn = |m: i32| Complex::from_polar(1.0, -f64::from(m) * azimuth);
+    (1..).zip(harmonics).map(|(m, harmonic)| harmonic * turn(m)).sum()
 }
 
 fn is_better(score: Complex<f64>, best: Complex<f64>) -> bool {
@@ -235,17 +250,20 @@ mod tests {
         let [a, b, c] = [corner(0.1, 0.2, -0.5), corner(0.9, -0.3, 0.4), corner(0.4, 0.8, 1.0)];
         let area =
             |[a, b, c]: [(Complex<f64>, f64); 3]| ((b.0 - a.0).conj() * (c.0 - a.0)).im / 2.0;
-        let sum = |triangles: &[[(Complex<f64>, f64); 3]]| {
-            let mut sum = Harmonics::zero(5);
-            triangles.iter().for_each(|t| sum.add_triangle(*t, area(*t)));
-            sum
+        let sums = |triangles: &[[(Complex<f64>, f64); 3]]| {
+            let mut sums = [[Complex::new(0.0, 0.0); 5]; 2];
+            for t in triangles {
+                add_plain(&mut sums[0], t.map(|(z, _)| z), area(*t));
+                add_by_height(&mut sums[1], *t, area(*t));
+            }
+            sums
         };
         let m = (b.0 * 0.7 + c.0 * 0.3, b.1 * 0.7 + c.1 * 0.3);
-        let (whole, halves) = (sum(&[[a, b, c]]), sum(&[[a, b, m], [a, m, c]]));
-        for (p, q) in [(&whole.plain, &halves.plain), (&whole.by_height, &halves.by_height)] {
-            assert!(p.iter().zip(q).all(|(p, q)| (p - q).norm() < 1e-15));
-        }
+        let (whole, halves) = (sums(&[[a, b, c]]), sums(&[[a, b, m], [a, m, c]]));
+        let pairs = whole.as_flattened().iter().zip(halves.as_flattened());
+        assert!(pairs.into_iter().all(|(p, q)| (p - q).norm() < 1e-15));
         // The first is the centroid times the area.
-        assert!((whole.plain[0] - (a.0 + b.0 + c.0) / 3.0 * whole.area).norm() < 1e-15);
+        let centroid = (a.0 + b.0 + c.0) / 3.0 * area([a, b, c]);
+        assert!((whole[0][0] - centroid).norm() < 1e-15);
     }
 }

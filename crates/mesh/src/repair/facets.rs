@@ -16,6 +16,7 @@
 //! itself. A double skin that is thinned has no direction of its own; its neighbours decide.
 
 use super::{Winding, Work};
+use crate::groups::Groups;
 use crate::measure;
 use crate::mesh::{Mesh, repeated};
 use crate::note::Tally;
@@ -111,14 +112,13 @@ struct Rim {
 fn thin_double_skins(work: &mut Work, edges: &Edges, pairs: &[Pair], keep: &mut [bool]) {
     let rims = rims(edges, pairs, keep);
     // Pairs that share an edge with nothing else there belong to one patch.
-    let mut leader: Vec<usize> = (0..pairs.len()).collect();
+    let mut groups = Groups::new(pairs.len());
     for rim in rims.iter().filter(|rim| rim.n_others == 0) {
         for &pair in &rim.pairs[1..] {
-            let (a, b) = (find(&mut leader, rim.pairs[0]), find(&mut leader, pair));
-            leader[a.max(b)] = a.min(b);
+            groups.join(rim.pairs[0], pair);
         }
     }
-    let patch_of: Vec<usize> = (0..pairs.len()).map(|i| find(&mut leader, i)).collect();
+    let patch_of: Vec<usize> = (0..pairs.len()).map(|i| groups.leader(i)).collect();
     let mut odd_if_kept = vec![0; pairs.len()];
     let mut odd_if_thinned = vec![0; pairs.len()];
     let mut alone = vec![true; pairs.len()];
@@ -167,15 +167,6 @@ fn rims(edges: &Edges, pairs: &[Pair], keep: &[bool]) -> Vec<Rim> {
     uses.chunk_by(|a, b| a.0 == b.0)
         .map(|run| Rim { pairs: run.iter().map(|(_, i)| *i).collect(), n_others: others(run[0].0) })
         .collect()
-}
-
-/// The leader of a group, with the path to it halved on the way.
-fn find(leader: &mut [usize], mut i: usize) -> usize {
-    while leader[i] != i {
-        leader[i] = leader[leader[i]];
-        i = leader[i];
-    }
-    i
 }
 
 #[cfg(test)]

@@ -559,6 +559,13 @@ pub const KEYS: &[Key] = &[
         (0.2, 0.02, 5.0),
         "thinnest single bead; thinner places stay empty and are reported",
     ),
+    number(
+        Print,
+        "gap_width_min_mm",
+        "gap_width_min",
+        (0.08, 0.01, 5.0),
+        "thinnest gap between beads that is filled",
+    ),
     number(Print, "thin_width_max_mm", "thin_width_max", (0.85, 0.05, 5.0), "widest single bead"),
     count(
         Print,

@@ -203,6 +203,7 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
         },
         thin: ThinParams {
             least_width: get.number("thin_width_min_mm"),
+            least_gap: get.number("gap_width_min_mm"),
             greatest_width: get.number("thin_width_max_mm"),
         },
         skins: SkinParams {
