@@ -155,27 +155,30 @@ const SHORTEST_PIECE_MM: f64 = 0.02;
 /// points of the program anyway. Infill may move as far as the piece is long.
 const SHORT_PIECE_TOLERANCE_MM: f64 = 0.005;
 
-/// Leaves out stations that end a piece too short to matter, where the line hardly moves for it and
-/// the bead stays the same.
+/// Leaves out one end of each piece too short to matter, where the line hardly moves for it and the
+/// bead stays the same.
 fn leave_out_short(stations: &mut Vec<Station>, role: Role) {
     let tolerance = match role {
         Role::ExternalPerimeter | Role::Perimeter => SHORT_PIECE_TOLERANCE_MM,
         _ => SHORTEST_PIECE_MM,
     };
+    let can_go = |before: &Station, station: &Station, after: &Station| {
+        let (a, p, b) = (before.at.xy(), station.at.xy(), after.at.xy());
+        distance_to_segment(&a, &b, &p) < tolerance && before.bead == station.bead
+    };
     let mut kept: Vec<Station> = Vec::with_capacity(stations.len());
     for (i, station) in stations.iter().enumerate() {
-        let short = match (kept.last(), stations.get(i + 1)) {
-            (Some(last), Some(next)) => {
-                let (a, p, b) = (last.at.xy(), station.at.xy(), next.at.xy());
-                distance(&a, &p) < SHORTEST_PIECE_MM
-                    && distance_to_segment(&a, &b, &p) < tolerance
-                    && last.bead == station.bead
+        let is_short = kept
+            .last()
+            .is_some_and(|last| distance(&last.at.xy(), &station.at.xy()) < SHORTEST_PIECE_MM);
+        match (kept.as_slice(), stations.get(i + 1)) {
+            ([.., last], Some(next)) if is_short && can_go(last, station, next) => continue,
+            ([.., before, last], _) if is_short && can_go(before, last, station) => {
+                kept.pop();
             }
-            _ => false,
-        };
-        if !short {
-            kept.push(*station);
+            _ => (),
         }
+        kept.push(*station);
     }
     *stations = kept;
 }

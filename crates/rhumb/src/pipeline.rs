@@ -145,6 +145,7 @@ fn unusable(class: &'static str, error: &dyn std::error::Error, hint: Option<Str
     }
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "the shape that map_err calls")]
 fn written(error: std::io::Error) -> Failure {
     output::failed(Path::new("program"), &error)
 }

@@ -514,8 +514,8 @@ pub const KEYS: &[Key] = &[
     choice(
         Print,
         "seam_position",
-        &["aligned", "nearest"],
-        "where walls begin: above the seam below, or where the nozzle is nearest",
+        &["nearest", "aligned"],
+        "where walls begin: where the nozzle is nearest (least travel), or above the seam below",
     ),
     number(
         Print,

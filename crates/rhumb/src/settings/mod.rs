@@ -1,7 +1,7 @@
 //! Settings: what a printer is, what a material needs, what a print should be.
 //!
 //! Three files, each may inherit from another; the command line wins over all. [`key`] lists every
-//! setting with its unit, range, default and meaning, [`file`] reads TOML, [`merge`] puts the
+//! setting with its unit, range, default and meaning, [`mod@file`] reads TOML, [`merge`] puts the
 //! sources together and remembers which one each value came from, [`resolve`] turns the result into
 //! the parameters of each stage, and [`template`] fills the start and end programs.
 

@@ -1,8 +1,8 @@
 //! Lines that fill an area.
 //!
 //! Every pattern answers the same question: which lines, inside an area, lie a given distance
-//! apart? Open lines come as [`Chord`]s that end on the rim of the area and are then joined along
-//! it ([`link`]); closed ones are loops.
+//! apart? Open lines come as chords that end on the rim of the area and are then joined along it;
+//! closed ones are loops.
 //!
 //! Lines keep half a spacing from the edge of the area. With the pieces of rim that join them they
 //! then take exactly the area's volume: a line that ends at the rim leaves half a spacing at either
