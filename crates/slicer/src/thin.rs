@@ -9,13 +9,16 @@
 //! the side, which overstates it between staggered points; branches shorter than the place is wide
 //! are corners and are dropped.
 
+mod rim;
+
 use geom::grid::mm;
-use geom::polyline::{distance_to_segment, share_nearest};
+use geom::polyline::share_nearest;
 use geom::region::{Island, Region, ring_sides};
 use geom::simplify::mark_kept;
 use geom::triangulate::{Triangulation, triangulate};
 use nalgebra::{Point2, center, distance};
 
+use self::rim::Rim;
 use crate::toolpath::LostArea;
 
 /// The widths that a single bead may have.
@@ -37,9 +40,13 @@ pub(crate) struct AxisPoint {
     pub(crate) width: f64,
 }
 
-/// Distance of points on the densified rings, mm: about as the thinnest bead is wide, so that sides
-/// of the triangulation cross from rim to rim and not along it.
-const RIM_STEP_MM: f64 = 0.12;
+/// Distance of points on the densified rings in mean widths of the place. Farther apart than the
+/// place is wide, and sides of the triangulation run along the rim instead of across; much closer
+/// only costs time.
+const RIM_STEP_IN_WIDTHS: f64 = 0.6;
+
+/// Limits of that distance, mm: about the width of the thinnest bead, and half of a wide one.
+const RIM_STEP_MM: [f64; 2] = [0.12, 0.3];
 
 /// How much an axis may be simplified, mm, in place and in half its width alike.
 const AXIS_TOLERANCE_MM: f64 = 0.01;
@@ -75,19 +82,14 @@ pub(crate) fn axes(
 }
 
 fn axes_of_island(island: &Island, least: f64, greatest: f64) -> Vec<Vec<AxisPoint>> {
-    let rings: Vec<Vec<Point2<f64>>> = island.iter().map(|ring| densified(ring)).collect();
+    let step = rim_step(island);
+    let rings: Vec<Vec<Point2<f64>>> = island.iter().map(|ring| densified(ring, step)).collect();
     // Rings of a region never cross, so this fails only on rings that touch along a side within a
     // grid step; such a sliver has no axis worth laying.
     let Ok(triangles) = triangulate(&rings) else { return Vec::new() };
+    let rim = Rim::new(&rings);
     let points: Vec<Point2<f64>> = rings.into_iter().flatten().collect();
-    let width_at = |p: &Point2<f64>| {
-        2.0 * island
-            .iter()
-            .flat_map(|ring| ring_sides(ring))
-            .map(|(a, b)| distance_to_segment(&mm(a), &mm(b), p))
-            .fold(f64::INFINITY, f64::min)
-    };
-    let graph = AxisGraph::new(&triangles, &points, width_at);
+    let graph = AxisGraph::new(&triangles, &points, &rim);
     graph
         .branches()
         .into_iter()
@@ -100,12 +102,20 @@ fn axes_of_island(island: &Island, least: f64, greatest: f64) -> Vec<Vec<AxisPoi
         .collect()
 }
 
-/// The ring in mm, with points no farther apart than [`RIM_STEP_MM`].
-fn densified(ring: &[geom::grid::GridPoint]) -> Vec<Point2<f64>> {
+/// The distance of points on the rim that suits a place.
+fn rim_step(island: &Island) -> f64 {
+    let region = Region::from_island(island.clone());
+    // A strip has two long sides.
+    let mean_width = 2.0 * region.area() / region.perimeter();
+    (RIM_STEP_IN_WIDTHS * mean_width).clamp(RIM_STEP_MM[0], RIM_STEP_MM[1])
+}
+
+/// The ring in mm, with points no farther apart than `step`.
+fn densified(ring: &[geom::grid::GridPoint], step: f64) -> Vec<Point2<f64>> {
     let mut points = Vec::new();
     for (a, b) in ring_sides(ring) {
         let (a, b) = (mm(a), mm(b));
-        let pieces = (distance(&a, &b) / RIM_STEP_MM).ceil().max(1.0);
+        let pieces = (distance(&a, &b) / step).ceil().max(1.0);
         for k in 0..pieces as u32 {
             points.push(a + (b - a) * (f64::from(k) / pieces));
         }
@@ -121,11 +131,7 @@ struct AxisGraph {
 }
 
 impl AxisGraph {
-    fn new(
-        triangles: &Triangulation,
-        points: &[Point2<f64>],
-        width_at: impl Fn(&Point2<f64>) -> f64,
-    ) -> Self {
+    fn new(triangles: &Triangulation, points: &[Point2<f64>], rim: &Rim) -> Self {
         let mut graph = Self { nodes: Vec::new(), links: Vec::new() };
         // One node for each side between two triangles, made when its first triangle is met.
         let mut side_node = vec![[None; 3]; triangles.triangles.len()];
@@ -137,7 +143,7 @@ impl AxisGraph {
                 let Some(other) = neighbours[k] else { continue };
                 let node = *side_node[t][k].get_or_insert_with(|| {
                     let ends = [corners[k], corners[(k + 1) % 3]].map(|c| points[c as usize]);
-                    graph.add(center(&ends[0], &ends[1]), &width_at)
+                    graph.add(center(&ends[0], &ends[1]), &ends[0], rim)
                 });
                 let back = triangles.neighbours[other as usize]
                     .iter()
@@ -153,7 +159,7 @@ impl AxisGraph {
                         + graph.nodes[b].at.coords
                         + graph.nodes[c].at.coords)
                         / 3.0;
-                    let hub = graph.add(middle.into(), &width_at);
+                    let hub = graph.add(middle.into(), &points[corners[0] as usize], rim);
                     for side in [a, b, c] {
                         graph.link(hub, side);
                     }
@@ -164,8 +170,10 @@ impl AxisGraph {
         graph
     }
 
-    fn add(&mut self, at: Point2<f64>, width_at: &impl Fn(&Point2<f64>) -> f64) -> usize {
-        self.nodes.push(AxisPoint { at, width: width_at(&at) });
+    /// Adds a node; `on_rim` is any point of the rim, best a near one.
+    fn add(&mut self, at: Point2<f64>, on_rim: &Point2<f64>, rim: &Rim) -> usize {
+        let width = 2.0 * rim.distance(&at, distance(&at, on_rim));
+        self.nodes.push(AxisPoint { at, width });
         self.links.push(Vec::new());
         self.nodes.len() - 1
     }

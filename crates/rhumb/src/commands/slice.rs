@@ -114,7 +114,8 @@ fn tell(
     if manner.quiet {
         return Ok(());
     }
-    let text = summary::text(report, outcome, verdict, job, &display_name(target), manner.verbose);
+    let text =
+        summary::text(report, outcome, verdict, job, &target.display().to_string(), manner.verbose);
     if to_standard_output {
         // The program itself is on standard output; a summary that cannot be shown is no failure.
         let _ = std::io::stderr().lock().write_all(text.as_bytes());
