@@ -3,7 +3,8 @@
 //! This is the only crate that knows both arms of rhumb: where material goes (`slicer`) and what
 //! the machine can do (`machine`). In the order of the data: [`order`] says which line comes after
 //! which and [`seam`] where closed ones begin; [`route`] puts travel, retraction and lift between
-//! them; [`axis`] bends what would graze the rotation axis and [`resample`] turns strokes over the
+//! them, clear of what is
+//! [`printed`]; [`axis`] bends what would graze the rotation axis and [`resample`] turns strokes over the
 //! part into joint moves; [`speed`] finds the durations that the axes can keep, [`cooling`]
 //! stretches short layers, [`time`] estimates how long the print takes; [`planner`] runs it all,
 //! layer by layer.
@@ -12,6 +13,7 @@ pub mod axis;
 pub mod cooling;
 pub mod order;
 pub mod planner;
+pub mod printed;
 pub mod resample;
 pub mod route;
 pub mod seam;

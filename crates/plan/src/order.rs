@@ -3,6 +3,9 @@
 //! Islands, and the walls and fills in each, are visited by nearest neighbour: walls first, from
 //! the inside out (or the outside in), then infill. Fills can be run either way; their order is
 //! then improved by reversing stretches of it while that shortens the travel (2-opt).
+//!
+//! On curved layers lines go from low to high ([`OrderParams::uphill`]): the flat end of the nozzle
+//! reaches uphill, and must find nothing there but the layer below.
 
 use geom::polyline::{distance_to_segment, nearest_on_ring};
 use nalgebra::{Point2, Point3, distance};
@@ -18,6 +21,8 @@ pub struct OrderParams {
     pub seam: SeamPosition,
     /// Whether the external wall comes before those behind it.
     pub external_first: bool,
+    /// Whether lower lines come before higher ones: on curved layers.
+    pub uphill: bool,
 }
 
 /// A line in the order and direction in which it is laid; closed ones end where they begin.
@@ -54,7 +59,11 @@ pub fn order(
             .expect("islands are left");
         let index = left.remove(k);
         ordering.island = Some(index);
-        ordering.island(&layer.islands[index]);
+        if params.uphill {
+            ordering.island_uphill(&layer.islands[index]);
+        } else {
+            ordering.island(&layer.islands[index]);
+        }
     }
     ordering.lines
 }
@@ -89,8 +98,34 @@ impl Ordering<'_> {
                 .map_or(0, |(k, _)| k);
             self.walls(groups.remove(k));
         }
-        for (fill, reversed) in tour(&island.fills, self.nozzle) {
+        let fills: Vec<&Toolpath> = island.fills.iter().collect();
+        for (fill, reversed) in tour(&fills, self.nozzle) {
             self.fill(fill, reversed);
+        }
+    }
+
+    /// Lines by height, in bands, each band by nearest neighbour.
+    fn island_uphill(&mut self, island: &IslandPaths) {
+        let walls = island.walls.iter().flat_map(|group| &group.loops);
+        let mut lines: Vec<(f64, &Toolpath)> =
+            walls.chain(&island.fills).map(|path| (mean_height(path), path)).collect();
+        lines.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut rest = &lines[..];
+        while let Some(&(lowest, _)) = rest.first() {
+            let (band, above) =
+                rest.split_at(rest.partition_point(|(height, _)| *height <= lowest + BAND_MM));
+            rest = above;
+            let paths: Vec<&Toolpath> = band.iter().map(|(_, path)| *path).collect();
+            for (path, reversed) in tour(&paths, self.nozzle) {
+                match path.role {
+                    Role::ExternalPerimeter if path.closed => {
+                        let line = plane(path);
+                        let seam = self.seams.choose(&line, &self.nozzle, self.params.seam);
+                        self.push(begun_at(path, seam));
+                    }
+                    _ => self.fill(path, uphill(path).unwrap_or(reversed)),
+                }
+            }
         }
     }
 
@@ -128,12 +163,39 @@ impl Ordering<'_> {
     }
 
     fn push(&mut self, mut line: OrderedLine) {
-        leave_out_short(&mut line.stations, line.role);
+        let may_move = match line.role {
+            Role::ExternalPerimeter | Role::Perimeter => SHORT_PIECE_TOLERANCE_MM,
+            // On a slope whatever moves leaves its surface.
+            _ if self.params.uphill => SHORT_PIECE_TOLERANCE_MM,
+            _ => SHORTEST_PIECE_MM,
+        };
+        leave_out_short(&mut line.stations, may_move);
         if let Some(last) = line.stations.last() {
             self.nozzle = last.at.xy();
         }
         self.lines.push(OrderedLine { island: self.island, ..line });
     }
+}
+
+/// Height over which lines of a curved layer may come in any order, mm: two beads side by side on a
+/// slope of 30° differ by about as much.
+const BAND_MM: f64 = 0.25;
+
+/// Mean height of a line, by length.
+fn mean_height(path: &Toolpath) -> f64 {
+    let (mut length, mut moment) = (0.0, 0.0);
+    for (a, b) in path.sides() {
+        let side = (b.at - a.at).norm();
+        length += side;
+        moment += side * f64::midpoint(a.at.z, b.at.z);
+    }
+    if length > 0.0 { moment / length } else { path.stations[0].at.z }
+}
+
+/// Whether an open line must be reversed to run uphill; `None` where its ends are equally high.
+fn uphill(path: &Toolpath) -> Option<bool> {
+    let (first, last) = (path.stations.first()?.at.z, path.stations.last()?.at.z);
+    (!path.closed && (first - last).abs() > BAND_MM).then_some(first > last)
 }
 
 fn plane(path: &Toolpath) -> Vec<Point2<f64>> {
@@ -157,11 +219,7 @@ const SHORT_PIECE_TOLERANCE_MM: f64 = 0.005;
 
 /// Leaves out one end of each piece too short to matter, where the line hardly moves for it and the
 /// bead stays the same.
-fn leave_out_short(stations: &mut Vec<Station>, role: Role) {
-    let tolerance = match role {
-        Role::ExternalPerimeter | Role::Perimeter => SHORT_PIECE_TOLERANCE_MM,
-        _ => SHORTEST_PIECE_MM,
-    };
+fn leave_out_short(stations: &mut Vec<Station>, tolerance: f64) {
     let can_go = |before: &Station, station: &Station, after: &Station| {
         let (a, p, b) = (before.at.xy(), station.at.xy(), after.at.xy());
         distance_to_segment(&a, &b, &p) < tolerance && before.bead == station.bead
@@ -218,7 +276,7 @@ const MOST_IMPROVED: usize = 400;
 const LEAST_GAIN_MM: f64 = 1e-6;
 
 /// The order in which to lay fills, and whether each is reversed.
-fn tour(fills: &[Toolpath], start: Point2<f64>) -> Vec<(&Toolpath, bool)> {
+fn tour<'a>(fills: &[&'a Toolpath], start: Point2<f64>) -> Vec<(&'a Toolpath, bool)> {
     let ends: Vec<[Point2<f64>; 2]> = fills
         .iter()
         .map(|fill| {
@@ -231,7 +289,7 @@ fn tour(fills: &[Toolpath], start: Point2<f64>) -> Vec<(&Toolpath, bool)> {
     if tour.len() <= MOST_IMPROVED {
         improve(&mut tour, &ends, start);
     }
-    tour.into_iter().map(|stop| (&fills[stop.fill], stop.reversed)).collect()
+    tour.into_iter().map(|stop| (fills[stop.fill], stop.reversed)).collect()
 }
 
 #[derive(Clone, Copy)]
@@ -324,7 +382,7 @@ mod tests {
     }
 
     fn ordered(layer: &LayerPaths, external_first: bool) -> Vec<OrderedLine> {
-        let params = OrderParams { seam: SeamPosition::Nearest, external_first };
+        let params = OrderParams { seam: SeamPosition::Nearest, external_first, uphill: false };
         order(layer, Point2::origin(), &mut SeamMemory::default(), &params)
     }
 
@@ -332,12 +390,12 @@ mod tests {
     fn short_pieces_go_unless_the_line_would_move() {
         let stations = |points: &[[f64; 2]]| line(points, Role::Perimeter, false).stations;
         let mut straight = stations(&[[0.0, 0.0], [0.01, 0.001], [5.0, 0.0]]);
-        leave_out_short(&mut straight, Role::Perimeter);
+        leave_out_short(&mut straight, SHORT_PIECE_TOLERANCE_MM);
         assert_eq!(straight.len(), 2);
         let mut notch = stations(&[[0.0, 0.0], [0.0, 0.015], [5.0, 0.0]]);
-        leave_out_short(&mut notch, Role::Perimeter);
+        leave_out_short(&mut notch, SHORT_PIECE_TOLERANCE_MM);
         assert_eq!(notch.len(), 3);
-        leave_out_short(&mut notch, Role::SolidInfill);
+        leave_out_short(&mut notch, SHORTEST_PIECE_MM);
         assert_eq!(notch.len(), 2);
     }
 
@@ -358,6 +416,33 @@ mod tests {
         for line in &ordered(&layer, false)[..2] {
             assert_eq!(line.stations.first().unwrap().at, line.stations.last().unwrap().at);
         }
+    }
+
+    #[test]
+    fn on_a_slope_lower_lines_come_first_and_open_ones_run_uphill() {
+        let raised = |mut path: Toolpath, heights: &[f64]| {
+            for (station, z) in path.stations.iter_mut().zip(heights.iter().cycle()) {
+                station.at.z = *z;
+            }
+            path
+        };
+        let walls = WallGroup {
+            loops: vec![
+                raised(square(0.0, 0.0, 5.0, Role::ExternalPerimeter), &[1.0]),
+                raised(square(0.0, 0.0, 4.6, Role::Perimeter), &[1.4]),
+            ],
+        };
+        let slope = line(&[[0.0, 0.0], [3.0, 0.0]], Role::SolidInfill, false);
+        let fills = vec![raised(slope, &[4.0, 2.0])];
+        let island = IslandPaths { walls: vec![walls], fills, ..IslandPaths::default() };
+        let layer = LayerPaths { islands: vec![island], ..LayerPaths::default() };
+        let params =
+            OrderParams { seam: SeamPosition::Nearest, external_first: false, uphill: true };
+        let lines = order(&layer, Point2::origin(), &mut SeamMemory::default(), &params);
+        let roles: Vec<Role> = lines.iter().map(|line| line.role).collect();
+        assert_eq!(roles, [Role::ExternalPerimeter, Role::Perimeter, Role::SolidInfill]);
+        let heights: Vec<f64> = lines[2].stations.iter().map(|s| s.at.z).collect();
+        assert_eq!(heights, [2.0, 4.0]);
     }
 
     #[test]
@@ -394,6 +479,7 @@ mod tests {
         let rows: Vec<Toolpath> = (0..6)
             .map(|i| line(&[[0.0, f64::from(i)], [20.0, f64::from(i)]], Role::SolidInfill, false))
             .collect();
+        let rows: Vec<&Toolpath> = rows.iter().collect();
         let tour = tour(&rows, Point2::origin());
         let reversed: Vec<bool> = tour.iter().map(|(_, reversed)| *reversed).collect();
         assert_eq!(reversed, [false, true, false, true, false, true]);

@@ -9,6 +9,7 @@ use slicer::toolpath::LayerPaths;
 
 use crate::cooling::{CoolingParams, slow_down};
 use crate::order::{OrderParams, order};
+use crate::printed::Printed;
 use crate::resample::{Leg, ResampleParams, Resampler};
 use crate::route::{FilamentParams, Item, Kind, Router, Speeds, Stroke};
 use crate::seam::SeamMemory;
@@ -30,6 +31,8 @@ pub struct PlanParams {
     pub cooling: CoolingParams,
     /// Part fan and nozzle temperature.
     pub heat: HeatParams,
+    /// Whether layers are curved, so that travel must look out for what is printed.
+    pub curved: bool,
 }
 
 /// Fan and temperature over the layers.
@@ -101,11 +104,12 @@ impl<'a> Planner<'a> {
     #[must_use]
     pub fn new(printer: &'a Printer, params: PlanParams) -> Self {
         let resampler = Resampler::new(printer, params.resample);
+        let printed = params.curved.then(|| Printed::nothing(printer.rail.max));
         Self {
             printer,
             params,
             limits: Limits::of(printer, params.resample.dialect.space == Space::Joints),
-            router: Router::new(resampler.at(), printer.lift.speed),
+            router: Router::new(resampler.at(), printer.lift.speed, printed),
             resampler,
             seams: SeamMemory::default(),
             pace: Pace::REST,

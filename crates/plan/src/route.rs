@@ -10,6 +10,7 @@ use slicer::bead::Bead;
 use slicer::toolpath::{LayerPaths, Role, Station};
 
 use crate::order::OrderedLine;
+use crate::printed::Printed;
 
 /// Speeds that are wanted, mm/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,22 +112,30 @@ pub struct Router {
     top: f64,
     /// Speed of the lift, mm/s.
     lift_speed: f64,
+    /// What stands on the bed, where layers are curved.
+    printed: Option<Printed>,
     items: Vec<Item>,
 }
+
+/// Travel may graze what is printed by this much, mm: what neighbouring beads of a slope stand above
+/// each other in the same cell of [`Printed`].
+const CLEAR_MM: f64 = 0.1;
 
 /// A line's width may drift by this share before viewers are told.
 const WIDTH_DRIFT: f64 = 0.05;
 
 impl Router {
-    /// Returns a router whose nozzle stands at `at`, filament ready.
+    /// Returns a router whose nozzle stands at `at`, filament ready. `printed` is the empty bed where
+    /// layers are curved; on flat ones nothing ever stands above the nozzle.
     #[must_use]
-    pub fn new(at: Point3<f64>, lift_speed: f64) -> Self {
+    pub fn new(at: Point3<f64>, lift_speed: f64, printed: Option<Printed>) -> Self {
         Self {
             at,
             retracted: false,
             last_line: Vec::new(),
             top: 0.0,
             lift_speed,
+            printed,
             items: Vec::new(),
         }
     }
@@ -199,7 +208,17 @@ impl Router {
             self.retract(filament);
         }
         let lift = if self.retracted { filament.retract_lift } else { 0.0 };
-        self.go_over(to, self.at.z.max(to.z) + lift, speed);
+        match self.printed.as_ref().map(|printed| printed.over(&self.at, &to)) {
+            Some((above, _)) if lift == 0.0 && above <= CLEAR_MM => {
+                if self.at != to {
+                    self.stroke(Kind::Travel, to, 0.0, speed);
+                }
+            }
+            over => {
+                let highest = over.map_or(0.0, |(_, highest)| highest);
+                self.go_over(to, self.at.z.max(to.z).max(highest) + lift, speed);
+            }
+        }
         if self.retracted {
             self.stroke(Kind::Filament, to, filament.retract_length, filament.retract_speed);
             self.retracted = false;
@@ -284,6 +303,9 @@ impl Router {
             let fed = area * length / filament.area * filament.multiplier;
             let melts = filament.volume_per_second / (area * filament.multiplier);
             self.stroke(Kind::Print, pair[1].at, fed, wanted.min(melts));
+            if let Some(printed) = &mut self.printed {
+                printed.add(&pair[0].at, &pair[1].at);
+            }
         }
         self.last_line = line.stations.iter().map(|station| station.at).collect();
     }
@@ -400,7 +422,7 @@ mod tests {
 
     #[test]
     fn filament_is_the_volume_of_the_bead() {
-        let mut router = Router::new(Point3::new(0.0, 0.0, 0.8), 10.0);
+        let mut router = Router::new(Point3::new(0.0, 0.0, 0.8), 10.0, None);
         let items =
             router.layer(&layer(), &[line(&[[0.0, 0.0], [7.0, 0.0]], 0.8)], &SPEEDS, &FILAMENT);
         let printed = strokes(&items);
@@ -411,7 +433,7 @@ mod tests {
 
     #[test]
     fn filament_is_drawn_back_only_across_outlines_and_always_fed_again() {
-        let mut router = Router::new(Point3::new(-9.0, 0.0, 0.8), 10.0);
+        let mut router = Router::new(Point3::new(-9.0, 0.0, 0.8), 10.0, None);
         let lines = [
             line(&[[-9.0, 0.0], [-5.0, 0.0]], 0.8),
             line(&[[5.0, 0.0], [9.0, 0.0]], 0.8),
@@ -429,9 +451,26 @@ mod tests {
     }
 
     #[test]
+    fn travel_over_a_dome_rises_above_it_and_no_higher() {
+        let filament = FilamentParams { retract_length: 0.0, ..FILAMENT };
+        let printed = Some(Printed::nothing(50.0));
+        let mut router = Router::new(Point3::new(0.0, -9.0, 5.0), 10.0, printed);
+        let lines = [line(&[[0.0, -9.0], [0.0, 9.0]], 5.0), line(&[[-9.0, 0.0], [-8.0, 0.0]], 1.0)];
+        let to_the_foot = strokes(&router.layer(&layer(), &lines, &SPEEDS, &filament));
+        let heights = |strokes: &[Stroke]| -> Vec<f64> {
+            let travels = strokes.iter().filter(|s| s.kind == Kind::Travel);
+            travels.map(|s| (s.to.z * 100.0).round() / 100.0).collect()
+        };
+        assert_eq!(heights(&to_the_foot), [5.0, 1.0], "down only where the dome has ended");
+        let beyond = [line(&[[8.0, 0.0], [9.0, 0.0]], 1.0)];
+        let across = strokes(&router.layer(&layer(), &beyond, &SPEEDS, &filament));
+        assert_eq!(heights(&across), [5.0, 5.0, 1.0]);
+    }
+
+    #[test]
     fn a_wipe_draws_back_the_same_amount() {
         let filament = FilamentParams { wipe: 3.0, ..FILAMENT };
-        let mut router = Router::new(Point3::new(0.0, 0.0, 0.8), 10.0);
+        let mut router = Router::new(Point3::new(0.0, 0.0, 0.8), 10.0, None);
         let lines = [
             line(&[[0.0, 0.0], [1.0, 0.0], [1.0, 5.0]], 0.8),
             line(&[[50.0, 0.0], [51.0, 0.0]], 0.8),
@@ -450,7 +489,7 @@ mod tests {
         for station in &mut fat.stations {
             station.bead = wide;
         }
-        let mut router = Router::new(Point3::new(0.0, 0.0, 0.8), 10.0);
+        let mut router = Router::new(Point3::new(0.0, 0.0, 0.8), 10.0, None);
         let strokes = strokes(&router.layer(&layer(), &[fat], &SPEEDS, &FILAMENT));
         assert!((strokes[0].speed * wide.area() - 11.0).abs() < 1e-9);
     }

@@ -250,6 +250,7 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
                 _ => SeamPosition::Aligned,
             },
             external_first: get.switch("external_perimeters_first"),
+            uphill: false,
         },
         speeds: Speeds {
             external_perimeter: get.number("external_perimeter_speed_mm_per_s"),
@@ -287,6 +288,7 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
             fan: get.number("fan_speed"),
             layers_without_fan: get.count("disable_fan_first_layers"),
         },
+        curved: false,
     }
 }
 
