@@ -3,13 +3,14 @@
 //! Lengths are mm. The part frame has z up, the rotation axis of the bed as its z axis and the bed
 //! at z = 0. This crate knows no machine: not how fast anything runs, nor by which axes.
 //!
-//! In the order of the data: [`surface`] is the family of layers, [`level`] says where they lie,
-//! [`section`] cuts the mesh, [`walls`], [`thin`], [`skins`] and [`infill`] fill an island,
-//! [`adhesion`] surrounds the first layer, [`layer`] puts it together into [`toolpath`]s of
-//! [`bead`]s.
+//! In the order of the data: [`surface`] is the family of layers and [`chart`] the flat map of one,
+//! [`level`] says where they lie, [`section`] cuts the mesh, [`walls`], [`thin`], [`skins`] and
+//! [`infill`] fill an island, [`adhesion`] surrounds the first layer, [`layer`] puts it together
+//! into [`toolpath`]s of [`bead`]s.
 
 pub mod adhesion;
 pub mod bead;
+pub mod chart;
 pub mod infill;
 pub mod layer;
 pub mod level;
