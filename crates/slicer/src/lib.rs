@@ -14,6 +14,7 @@ pub mod chart;
 pub mod infill;
 pub mod layer;
 pub mod level;
+pub mod lift;
 pub mod section;
 pub mod skins;
 pub mod surface;

@@ -1,0 +1,202 @@
+//! From the chart of a layer to the part frame: where the nozzle runs, and how thick the bead is.
+//!
+//! Lines are straight between the stations of a toolpath, and a straight line of a chart is not:
+//! it is halved until its pieces lie on the layer to within [`CHORD_MM`].
+//!
+//! **Wedges.** Curved layers that begin on a flat floor begin with nothing: between the floor and the
+//! layer's upper side lies a wedge. With `tau` the distance from the upper side along the normal
+//! down to the floor, a bead is as thick as the layer where `tau` is at least the layer's thickness
+//! and the least printable one; below that it takes all of `tau`, down to the least printable
+//! thickness; below that nothing is laid, and the next layer takes over what is left. That balances
+//! volume exactly and no layer need know of another.
+
+use nalgebra::{Point2, Point3, center};
+
+use crate::bead::Bead;
+use crate::level::Level;
+use crate::surface::LayerSurface;
+use crate::toolpath::Station;
+
+/// How far the straight pieces of a toolpath may leave their layer, mm. With the machine's own chord
+/// tolerance on top, beads stay within 10 µm of their surface.
+pub const CHORD_MM: f64 = 0.002;
+
+/// How much thickness may differ from an even change along a piece, as a share of the layer's.
+const EVEN_SHARE: f64 = 0.02;
+
+/// Pieces are not cut shorter than this, mm.
+const SHORTEST_MM: f64 = 0.05;
+
+/// The least printable thickness of a wedge, as a share of the layer's.
+pub const LEAST_WEDGE_SHARE: f64 = 0.5;
+
+/// One layer in space. See the [module](self).
+#[derive(Clone, Copy)]
+pub struct Lift<'a> {
+    /// The family of the layer.
+    pub surface: &'a dyn LayerSurface,
+    /// The layer.
+    pub level: Level,
+    /// Height of the flat floor that the layer begins on, mm; `None` where it has none.
+    pub floor: Option<f64>,
+}
+
+impl Lift<'_> {
+    /// Returns the point of the layer's upper side that the chart shows at `uv`.
+    #[must_use]
+    pub fn point(&self, uv: &Point2<f64>) -> Point3<f64> {
+        self.surface.lift(self.level.upper, uv)
+    }
+
+    /// Returns the layer's full thickness at a point of its upper side, mm.
+    #[must_use]
+    pub fn full_thickness(&self, at: &Point3<f64>) -> f64 {
+        self.level.thickness() / self.surface.gradient(at).norm()
+    }
+
+    /// Returns how thick a bead is at a point of the upper side, mm; zero where none is laid.
+    #[must_use]
+    pub fn thickness(&self, at: &Point3<f64>) -> f64 {
+        let full = self.full_thickness(at);
+        let Some(floor) = self.floor else { return full };
+        let least = LEAST_WEDGE_SHARE * full;
+        // The normal is straight and its slope is that of the layer all along.
+        let tau = (at.z - floor) / self.surface.normal(at).z;
+        if tau < least {
+            0.0
+        } else if tau < full + least {
+            tau
+        } else {
+            full
+        }
+    }
+
+    /// Returns the stations of a line of the chart, whose beads are given for the full thickness;
+    /// where the layer is thinner they become thinner, in the same place.
+    #[must_use]
+    pub fn stations(&self, line: &[(Point2<f64>, Bead)], closed: bool) -> Vec<Station> {
+        let mut stations = Vec::with_capacity(line.len());
+        let closing = closed.then(|| line.first()).flatten();
+        for (k, from) in line.iter().enumerate() {
+            stations.push(self.station(&from.0, from.1));
+            if let Some(to) = line.get(k + 1).or(closing) {
+                self.between(from, to, &mut stations);
+            }
+        }
+        stations
+    }
+
+    fn station(&self, uv: &Point2<f64>, bead: Bead) -> Station {
+        let at = self.point(uv);
+        if self.floor.is_none() && self.surface.form().is_flat() {
+            return Station { at, bead };
+        }
+        let thickness = self.thickness(&at);
+        if thickness == bead.thickness {
+            return Station { at, bead };
+        }
+        Station { at, bead: Bead::with_spacing(bead.spacing(), thickness) }
+    }
+
+    /// Appends the stations strictly between two points of the chart.
+    fn between(
+        &self,
+        from: &(Point2<f64>, Bead),
+        to: &(Point2<f64>, Bead),
+        stations: &mut Vec<Station>,
+    ) {
+        if self.surface.form().is_flat() {
+            return;
+        }
+        let ends = [self.station(&from.0, from.1), self.station(&to.0, to.1)];
+        self.halve([from.0, to.0], ends, from.1, stations);
+    }
+
+    fn halve(
+        &self,
+        line: [Point2<f64>; 2],
+        ends: [Station; 2],
+        bead: Bead,
+        stations: &mut Vec<Station>,
+    ) {
+        let [a, b] = &ends;
+        if (b.at - a.at).norm() < SHORTEST_MM {
+            return;
+        }
+        let half = center(&line[0], &line[1]);
+        let middle = self.station(&half, bead);
+        let bulge = (middle.at - center(&a.at, &b.at)).norm();
+        let uneven =
+            (middle.bead.thickness - f64::midpoint(a.bead.thickness, b.bead.thickness)).abs();
+        if bulge <= CHORD_MM && uneven <= EVEN_SHARE * bead.thickness {
+            return;
+        }
+        self.halve([line[0], half], [*a, middle], bead, stations);
+        stations.push(middle);
+        self.halve([half, line[1]], [middle, *b], bead, stations);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::{Cone, Plane, Spheres};
+
+    const BEAD: Bead = Bead { width: 0.45, thickness: 0.2 };
+
+    fn line(points: &[[f64; 2]]) -> Vec<(Point2<f64>, Bead)> {
+        points.iter().map(|&p| (Point2::from(p), BEAD)).collect()
+    }
+
+    #[test]
+    fn flat_lines_keep_their_points() {
+        let level = Level { index: 3, lower: 0.6, upper: 0.8 };
+        let lift = Lift { surface: &Plane, level, floor: None };
+        let stations = lift.stations(&line(&[[-8.0, 1.0], [8.0, 1.0], [0.0, 9.0]]), true);
+        assert_eq!(stations.len(), 3);
+        assert!(stations.iter().all(|s| s.bead == BEAD && s.at.z == 0.8));
+    }
+
+    #[test]
+    fn pieces_lie_on_their_layer() {
+        let cone = Cone::new(0.5).unwrap();
+        let spheres = Spheres::new(-20.0).unwrap();
+        let families: [(&dyn LayerSurface, f64); 2] = [(&cone, 0.5_f64.cos()), (&spheres, 1.0)];
+        for (surface, cos) in families {
+            let level = Level { index: 0, lower: 20.0, upper: 20.0 + 0.2 / cos };
+            let lift = Lift { surface, level, floor: None };
+            let stations = lift.stations(&line(&[[-12.0, 3.0], [9.0, 3.0], [4.0, -11.0]]), false);
+            assert!((20..400).contains(&stations.len()), "{}", stations.len());
+            for pair in stations.windows(2) {
+                for share in [0.0, 0.25, 0.5, 0.75] {
+                    let at = pair[0].at + (pair[1].at - pair[0].at) * share;
+                    let off = (surface.level(&at) - level.upper).abs();
+                    assert!(off < 1.2 * CHORD_MM / cos, "{off} at {at}");
+                }
+                assert!((pair[0].bead.thickness - 0.2).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn wedges_thin_out_and_end() {
+        let angle = 30.0_f64.to_radians();
+        let cone = Cone::new(angle).unwrap();
+        let step = 0.2 / angle.cos();
+        let level = Level { index: 0, lower: 5.0 - step, upper: 5.0 };
+        let lift = Lift { surface: &cone, level, floor: Some(0.4) };
+        let at = |z: f64| Point3::new((5.0 - z) / angle.tan(), 0.0, z);
+        assert!((lift.thickness(&at(3.0)) - 0.2).abs() < 1e-6);
+        // tau of 0.15 mm: 0.13 mm above the floor.
+        assert!((lift.thickness(&at(0.4 + 0.15 * angle.cos())) - 0.15).abs() < 1e-12);
+        assert!((lift.thickness(&at(0.4 + 0.29 * angle.cos())) - 0.29).abs() < 1e-12);
+        assert_eq!(lift.thickness(&at(0.4 + 0.09 * angle.cos())), 0.0);
+        let rim = (5.0 - 0.4) / angle.tan() / angle.cos();
+        let stations = lift.stations(&line(&[[0.0, 1.0], [rim - 0.22, 0.3]]), false);
+        let thin = stations.iter().filter(|s| s.bead.thickness < 0.19).count();
+        assert!(thin >= 1);
+        for station in &stations {
+            assert!((station.bead.spacing() - BEAD.spacing()).abs() < 1e-12);
+        }
+    }
+}
