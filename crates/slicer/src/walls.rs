@@ -10,7 +10,7 @@
 //! Where what is left is thinner than two spacings, two beads do not fit side by side: such places
 //! are taken out and handed to [`thin`](crate::thin), which lays a single bead of the width there
 //! is. Outermost walls are let through somewhat narrower places, so that outlines stay closed; in
-//! these *tight* places their beads overlap and feed only what the place holds. An inset tells for
+//! these *tight* places their beads overlap and hold only what the place holds. An inset tells for
 //! nothing whether there are any such places, so parts without them pay nothing.
 
 use geom::grid::mm;

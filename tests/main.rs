@@ -1,0 +1,12 @@
+//! What users rely on, tested from outside: the rules of the house, the command line, and the
+//! properties of finished programs.
+//!
+//! Programs are judged here by a reader of their own ([`program`]), which shares no code with the
+//! crates that write or check them.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod bundled;
+mod golden;
+mod house;
+mod run;
