@@ -7,6 +7,9 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod bundled;
+mod cli;
 mod golden;
 mod house;
+mod names;
 mod run;
+mod settings;
