@@ -16,7 +16,7 @@ const HOME: [f64; 3] = [120.0, 0.0, 5.0];
 
 /// One `G1` of a program in the dialect `polar`.
 #[derive(Debug, Clone)]
-pub(crate) struct Motion {
+pub(crate) struct Motion<'a> {
     /// Counted from 1.
     pub(crate) line: usize,
     /// Carriage, bed, lift before and after.
@@ -27,13 +27,13 @@ pub(crate) struct Motion {
     /// Of the nozzle over the part, or of the filament where the nozzle stands, mm/s.
     pub(crate) speed: f64,
     /// What `;TYPE:`, `;WIDTH:`, `;LAYER:` and `;HEIGHT:` last said.
-    pub(crate) role: String,
+    pub(crate) role: &'a str,
     pub(crate) width: f64,
     pub(crate) layer: Option<usize>,
     pub(crate) height: f64,
 }
 
-impl Motion {
+impl Motion<'_> {
     /// Joints at a share of the way; the axes run together from end to end.
     fn joints(&self, share: f64) -> [f64; 3] {
         [0, 1, 2].map(|k| self.from[k] + (self.to[k] - self.from[k]) * share)
@@ -75,14 +75,14 @@ impl Motion {
 }
 
 /// Reads all motions of a program; panics at anything that the contract does not allow.
-pub(crate) fn motions(text: &str) -> Vec<Motion> {
+pub(crate) fn motions(text: &str) -> Vec<Motion<'_>> {
     let mut motions = Vec::new();
     let mut at = HOME;
     let (mut speed, mut width, mut height) = (f64::NAN, f64::NAN, f64::NAN);
-    let (mut role, mut layer) = (String::new(), None);
+    let (mut role, mut layer) = ("", None);
     for (line, words) in (1..).zip(text.lines()) {
         if let Some(value) = words.strip_prefix(";TYPE:") {
-            value.clone_into(&mut role);
+            role = value;
         } else if let Some(value) = words.strip_prefix(";WIDTH:") {
             width = value.parse().unwrap();
         } else if let Some(value) = words.strip_prefix(";HEIGHT:") {
@@ -105,16 +105,27 @@ pub(crate) fn motions(text: &str) -> Vec<Motion> {
                 other => panic!("line {line}: no printer was told of {other}"),
             }
         }
-        let role = role.clone();
         motions.push(Motion { line, from, to: at, e, speed, role, width, layer, height });
     }
     motions
 }
 
 /// The stretches of a role that are laid without a break, as the motions they are made of.
-pub(crate) fn beads<'a>(motions: &'a [Motion], role: &str) -> Vec<&'a [Motion]> {
+pub(crate) fn beads<'a, 'b>(motions: &'b [Motion<'a>], role: &str) -> Vec<&'b [Motion<'a>]> {
     motions
         .chunk_by(|a, b| a.lays() && b.lays() && a.role == b.role && a.layer == b.layer)
         .filter(|bead| bead[0].lays() && bead[0].role == role)
         .collect()
+}
+
+/// The volume that the triangles of a binary STL enclose, mm³.
+pub(crate) fn stl_volume(bytes: &[u8]) -> f64 {
+    let number = |bytes: &[u8]| f64::from(f32::from_le_bytes(bytes.try_into().unwrap()));
+    let facets = bytes[84..].chunks_exact(50).map(|facet| {
+        let c: Vec<f64> = facet[12..48].chunks_exact(4).map(number).collect();
+        c[0] * (c[4] * c[8] - c[5] * c[7])
+            + c[1] * (c[5] * c[6] - c[3] * c[8])
+            + c[2] * (c[3] * c[7] - c[4] * c[6])
+    });
+    facets.sum::<f64>() / 6.0
 }

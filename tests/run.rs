@@ -15,6 +15,14 @@ pub(crate) fn model(name: &str) -> PathBuf {
     root().join("models").join(format!("{name}.stl"))
 }
 
+/// The program of a bundled model.
+pub(crate) fn sliced(name: &str, arguments: &[&str]) -> String {
+    let file = model(name);
+    let mut all = vec!["slice", file.to_str().unwrap(), "-q", "-o", "-"];
+    all.extend(arguments);
+    Scratch::new().run(&all).expect(0).out
+}
+
 /// A folder that is gone at the end of the test.
 pub(crate) struct Scratch(PathBuf);
 

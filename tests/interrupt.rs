@@ -1,0 +1,57 @@
+//! Ctrl-C: the run ends soon, the old program stays, nothing is left behind.
+
+#![cfg(unix)]
+
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::run::{Ran, Scratch};
+
+/// Longest time until a run has begun, and until one that is asked to stop has ended. Far more than
+/// either takes, for slow machines.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// A run that would take minutes, in a folder with an old program; it has begun to write.
+fn long_run(scratch: &Scratch) -> Child {
+    scratch.cube("cube.stl", 100.0);
+    scratch.file("cube.gcode", "G28\n");
+    let fine = ["layer_height_mm=0.02", "min_layer_height_mm=0.01", "fill_density=60%"];
+    let mut arguments = vec!["slice", "cube.stl", "--report", "r.json"];
+    arguments.extend(fine.iter().flat_map(|pair| ["--set", pair]));
+    let child =
+        scratch.rhumb(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let start = Instant::now();
+    let is_writing = |name: &String| {
+        name.ends_with(".tmp")
+            && name.contains("cube.gcode")
+            && scratch.path(name).metadata().is_ok_and(|file| file.len() > 0)
+    };
+    while !scratch.names().iter().any(is_writing) {
+        assert!(start.elapsed() < PATIENCE, "the run does not begin");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child
+}
+
+fn stops_on(signal: &str) {
+    let scratch = Scratch::new();
+    let child = long_run(&scratch);
+    let asked = Instant::now();
+    let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let ran = Ran::from(child.wait_with_output().unwrap()).refused("Interrupted", 130);
+    assert!(asked.elapsed() < PATIENCE, "{:?}", asked.elapsed());
+    assert!(ran.err.contains("nothing was written"), "{}", ran.err);
+    assert_eq!(scratch.names(), ["cube.gcode", "cube.stl"]);
+    assert_eq!(std::fs::read(scratch.path("cube.gcode")).unwrap(), b"G28\n");
+}
+
+#[test]
+fn an_interrupted_run_leaves_nothing_behind() {
+    stops_on("INT");
+}
+
+#[test]
+fn a_terminated_run_leaves_nothing_behind() {
+    stops_on("TERM");
+}
