@@ -4,6 +4,14 @@
 //! `(u, v) = s·(cos θ, sin θ)`, mm. Lengths along the meridian are true; across it the chart is too
 //! long by `1/stretch`, where `stretch(s) = radius(s)/s`: 1 on a plane, cos(angle) on a cone, sin
 //! psi/psi on a sphere. Areas are `stretch` times those in the chart.
+//!
+//! [`Chart::inset`] and its like move borders by true distances; [`carried`] takes regions from one
+//! layer to another, along the normals.
+
+mod carry;
+mod offset;
+
+pub use carry::{carried, carried_point};
 
 use geom::grid::mm;
 use geom::region::{Region, Ring, ring_sides, signed_area};

@@ -1,0 +1,68 @@
+//! Regions and points taken from one layer to another, along the normals.
+
+use geom::grid::{mm, snap};
+use geom::polyline::distance_to_segment;
+use geom::region::{Fill, Region, Ring, ring_sides};
+use nalgebra::Point2;
+
+use crate::surface::LayerSurface;
+
+/// How far the image of a straight side may lie from its chords, mm: layers that are compared are
+/// known to about as much.
+const CARRY_TOLERANCE_MM: f64 = 0.002;
+
+/// Returns the place on layer `to` that the normal through `uv` of layer `from` leads to, both in
+/// the charts of their layers.
+#[must_use]
+pub fn carried_point(
+    surface: &dyn LayerSurface,
+    uv: &Point2<f64>,
+    from: f64,
+    to: f64,
+) -> Point2<f64> {
+    let s = uv.coords.norm();
+    if s == 0.0 { *uv } else { uv * (surface.carry(s, from, to) / s) }
+}
+
+/// Returns what the normals through a region of layer `from` cover on layer `to`, both in the
+/// charts of their layers. On planes it is the region itself.
+#[must_use]
+pub fn carried(surface: &dyn LayerSurface, region: &Region, from: f64, to: f64) -> Region {
+    if from == to || surface.chart(from).is_flat() {
+        return region.clone();
+    }
+    let image = |p: &Point2<f64>| carried_point(surface, p, from, to);
+    let rings: Vec<Ring> = region
+        .rings()
+        .map(|ring| {
+            let mut carried = Ring::with_capacity(ring.len());
+            for (a, b) in ring_sides(ring) {
+                let (a, b) = (mm(a), mm(b));
+                let ends = (image(&a), image(&b));
+                carried.push(snap(&ends.0));
+                side((&a, &b), (&ends.0, &ends.1), &image, &mut carried);
+            }
+            carried
+        })
+        .collect();
+    Region::from_grid_rings(&rings, Fill::Positive)
+}
+
+/// Appends points of the image of a side until chords are near enough.
+fn side(
+    (a, b): (&Point2<f64>, &Point2<f64>),
+    ends: (&Point2<f64>, &Point2<f64>),
+    image: &impl Fn(&Point2<f64>) -> Point2<f64>,
+    carried: &mut Ring,
+) {
+    let middle = nalgebra::center(a, b);
+    let at = image(&middle);
+    // The image never strays farther than the ends move, so short sides end the recursion.
+    let is_short = (b - a).norm_squared() <= CARRY_TOLERANCE_MM * CARRY_TOLERANCE_MM;
+    if is_short || distance_to_segment(ends.0, ends.1, &at) <= CARRY_TOLERANCE_MM {
+        return;
+    }
+    side((a, &middle), (ends.0, &at), image, carried);
+    carried.push(snap(&at));
+    side((&middle, b), (&at, ends.1), image, carried);
+}
