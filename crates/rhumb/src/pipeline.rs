@@ -21,6 +21,7 @@ use plan::planner::{Planner, Totals};
 use rayon::prelude::*;
 use slicer::layer::{Filled, fill_layer};
 use slicer::level::{Level, expected_count, schedule};
+use slicer::lift::Lift;
 use slicer::section::{Cutter, Section, Tears};
 use slicer::skins::{Neighbours, SKIN_TOLERANCE_MM};
 use slicer::surface::Plane;
@@ -317,7 +318,8 @@ impl<'a> Stack<'a> {
                         .map_while(cover)
                         .collect(),
                 };
-                fill_layer(&self.levels[k], &section.region, &neighbours, &Plane, &self.job.paths)
+                let lift = Lift { surface: &Plane, level: self.levels[k], floor: None };
+                fill_layer(&lift, &section.region, &neighbours, &self.job.paths)
             })
             .collect()
     }

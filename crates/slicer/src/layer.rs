@@ -1,17 +1,18 @@
 //! One layer put together: from its section to toolpaths in the part frame.
 
-use geom::region::{Island, Region};
+use geom::grid::{GridPoint, mm};
+use geom::region::{Fill, Island, Region};
 use nalgebra::Point2;
 use rayon::prelude::*;
 
 use crate::adhesion::{AdhesionParams, around};
 use crate::bead::Bead;
+use crate::chart::Chart;
 use crate::infill::{FillLayer, FillLine, InfillParams, fill};
-use crate::level::Level;
+use crate::lift::Lift;
 use crate::skins::{Neighbours, SKIN_TOLERANCE_MM, SkinParams, skins};
-use crate::surface::LayerSurface;
-use crate::thin::{ThinParams, axes};
-use crate::toolpath::{IslandPaths, LayerPaths, LostArea, Role, Station, Toolpath, WallGroup};
+use crate::thin::{AxisPoint, ThinParams, axes};
+use crate::toolpath::{IslandPaths, LayerPaths, LostArea, Role, Toolpath, WallGroup};
 use crate::walls::{ThinPlace, WallParams, split_thin, walls};
 
 /// How layers are filled.
@@ -42,26 +43,26 @@ pub struct Filled {
     pub floating_area: f64,
 }
 
-/// Fills the material of one layer.
+/// Fills the material of one layer; regions are in its chart.
 #[must_use]
 pub fn fill_layer(
-    level: &Level,
+    lift: &Lift<'_>,
     material: &Region,
     neighbours: &Neighbours<'_>,
-    surface: &dyn LayerSurface,
     params: &PathParams,
 ) -> Filled {
-    let lift = Lift { surface, level: *level };
+    let frame = Frame::of(lift);
     let islands: Vec<(IslandPaths, LostArea)> = material
         .islands()
         .par_iter()
-        .map(|island| fill_island(island, neighbours, &lift, params))
+        .map(|island| fill_island(island, neighbours, &frame, params))
         .collect();
+    let level = &lift.level;
     let mut filled = Filled {
         paths: LayerPaths {
             index: level.index,
             upper: level.upper,
-            thickness: level.thickness(),
+            thickness: frame.thickness,
             ..LayerPaths::default()
         },
         ..Filled::default()
@@ -69,20 +70,20 @@ pub fn fill_layer(
     if level.index > 0 {
         let below = neighbours.below.first();
         let floats = |island: &&Island| below.is_none_or(|below| !rests_on(island, below));
-        filled.floating_area = material.filtered(floats).area();
+        filled.floating_area = frame.chart.area(&material.filtered(floats));
     }
     for (paths, lost) in islands {
         filled.paths.lost.merge(&lost);
         filled.paths.islands.push(paths);
     }
-    if level.index == 0 {
-        let bead = Bead { width: params.walls.width, thickness: level.thickness() };
+    if level.index == 0 && frame.chart.is_flat() {
+        let bead = Bead { width: params.walls.width, thickness: frame.thickness };
         let adhesion = around(material, bead.width, bead.spacing(), &params.adhesion);
         filled.adhesion_out_of_reach = adhesion.out_of_reach;
         filled.paths.adhesion = adhesion
             .loops
             .iter()
-            .map(|points| lift.line(points, bead, Role::SkirtBrim, true))
+            .map(|points| frame.line(points, bead, Role::SkirtBrim, true))
             .collect();
     }
     filled
@@ -91,93 +92,112 @@ pub fn fill_layer(
 /// Whether an island has anything below it.
 fn rests_on(island: &Island, below: &Region) -> bool {
     // Nearly always the first corner decides.
-    island.iter().flatten().any(|&p| below.contains(&geom::grid::mm(p)))
+    island.iter().flatten().any(|&p| below.contains(&mm(p)))
         || !Region::from_island(island.clone()).intersection(below).is_empty()
 }
 
 fn fill_island(
     island: &Island,
     neighbours: &Neighbours<'_>,
-    lift: &Lift<'_>,
+    frame: &Frame<'_>,
     params: &PathParams,
 ) -> (IslandPaths, LostArea) {
     let outline = Region::from_island(island.clone());
-    let thickness = lift.level.thickness();
-    let walls = walls(&outline, thickness, &params.walls);
+    let Frame { chart, thickness, .. } = *frame;
+    let walls = walls(&outline, &chart, thickness, &params.walls);
     let solid_bead = Bead { width: params.infill.solid_width, thickness };
-    let split = split_thin(&walls.interior, solid_bead.spacing() / 2.0);
-    let layer = FillLayer { index: lift.level.index, thickness, tolerance: params.tolerance };
+    let split = split_thin(&walls.interior, &chart, solid_bead.spacing() / 2.0);
+    let index = frame.lift.level.index;
+    let layer = FillLayer { index, chart, thickness, tolerance: params.tolerance };
     let interior = split.thick.thinned(SKIN_TOLERANCE_MM);
-    let skins = skins(&interior, neighbours, solid_bead.spacing(), &params.skins);
+    let skins = skins(&interior, &chart, neighbours, solid_bead.spacing(), &params.skins);
     let filling = fill(&skins, &layer, &params.infill);
 
     let mut thin = walls.thin;
     let gaps = std::iter::once(split.thin).chain(filling.thin).filter(|gap| !gap.is_empty());
     thin.extend(gaps.map(|region| ThinPlace { region, role: Role::GapFill }));
     let mut lost = LostArea::default();
-    let mut fills: Vec<Toolpath> = filling.lines.iter().map(|line| lift.fill(line)).collect();
+    let mut fills: Vec<Toolpath> = filling.lines.iter().map(|line| frame.fill(line)).collect();
     for place in &thin {
-        fills.extend(single_beads(place, lift, params, &mut lost));
+        fills.extend(single_beads(place, frame, params, &mut lost));
     }
     let groups = walls.groups.iter().map(|group| {
         let loops = group.iter().map(|wall| {
             let role = if wall.depth == 0 { Role::ExternalPerimeter } else { Role::Perimeter };
-            let station =
-                |(at, bead): &(Point2<f64>, Bead)| Station { at: lift.point(at), bead: *bead };
-            let stations = wall.points.iter().map(station).collect();
-            Toolpath { role, closed: true, stations }
+            Toolpath { role, closed: true, stations: frame.lift.stations(&wall.points, true) }
         });
         WallGroup { loops: loops.collect() }
     });
-    (IslandPaths { walls: groups.collect(), outline, fills }, lost)
+    (IslandPaths { walls: groups.collect(), outline: frame.from_above(outline), fills }, lost)
 }
 
 fn single_beads(
     place: &ThinPlace,
-    lift: &Lift<'_>,
+    frame: &Frame<'_>,
     params: &PathParams,
     lost: &mut LostArea,
 ) -> Vec<Toolpath> {
-    let thickness = lift.level.thickness();
+    let Frame { chart, thickness, .. } = *frame;
     let least = match place.role {
         Role::ExternalPerimeter => params.thin.least_width,
         _ => params.thin.least_gap,
     };
-    axes(&place.region, least, params.thin.greatest_width, lost)
+    axes(&place.region, &chart, least, params.thin.greatest_width, lost)
         .into_iter()
         .map(|axis| {
-            let station = |p: crate::thin::AxisPoint| {
+            let with_bead = |p: AxisPoint| {
                 // Between walls the bead takes the whole gap; on its own it must not bulge out of
                 // the part.
                 let bead = match place.role {
                     Role::ExternalPerimeter => Bead { width: p.width, thickness },
                     _ => Bead::with_spacing(p.width, thickness),
                 };
-                Station { at: lift.point(&p.at), bead }
+                (p.at, bead)
             };
-            let stations = axis.into_iter().map(station).collect();
-            Toolpath { role: place.role, closed: false, stations }
+            let line: Vec<(Point2<f64>, Bead)> = axis.into_iter().map(with_bead).collect();
+            Toolpath {
+                role: place.role,
+                closed: false,
+                stations: frame.lift.stations(&line, false),
+            }
         })
         .collect()
 }
 
-/// From the chart of a layer to the part frame.
-struct Lift<'a> {
-    surface: &'a dyn LayerSurface,
-    level: Level,
+/// A layer's place in space and the metric of its chart.
+struct Frame<'a> {
+    lift: &'a Lift<'a>,
+    chart: Chart,
+    /// Along the normal; of caps, at the axis.
+    thickness: f64,
 }
 
-impl Lift<'_> {
-    fn point(&self, uv: &Point2<f64>) -> nalgebra::Point3<f64> {
-        self.surface.lift(self.level.upper, uv)
+impl<'a> Frame<'a> {
+    fn of(lift: &'a Lift<'a>) -> Self {
+        Self {
+            lift,
+            chart: lift.surface.chart(lift.level.upper),
+            thickness: lift.level.thickness() / lift.surface.level_step(1.0),
+        }
     }
 
     fn line(&self, points: &[Point2<f64>], bead: Bead, role: Role, closed: bool) -> Toolpath {
-        let stations = points.iter().map(|p| Station { at: self.point(p), bead }).collect();
-        Toolpath { role, closed, stations }
+        let line: Vec<(Point2<f64>, Bead)> = points.iter().map(|p| (*p, bead)).collect();
+        Toolpath { role, closed, stations: self.lift.stations(&line, closed) }
     }
 
     fn fill(&self, line: &FillLine) -> Toolpath {
         self.line(&line.points, line.bead, line.role, line.closed)
+    }
+
+    /// A region of the chart as it is seen from above.
+    fn from_above(&self, region: Region) -> Region {
+        if self.chart.is_flat() {
+            return region;
+        }
+        let seen = |&p: &GridPoint| self.lift.point(&mm(p)).xy();
+        let rings: Vec<Vec<Point2<f64>>> =
+            region.rings().map(|ring| ring.iter().map(seen).collect()).collect();
+        Region::from_rings(rings.iter().map(Vec::as_slice), Fill::Positive)
     }
 }

@@ -8,6 +8,8 @@
 
 use geom::region::Region;
 
+use crate::chart::Chart;
+
 /// How many layers close the part, and when a small place is not worth leaving sparse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SkinParams {
@@ -58,6 +60,7 @@ const NEGLIGIBLE_MM2: f64 = 0.01;
 #[must_use]
 pub fn skins(
     interior: &Region,
+    chart: &Chart,
     neighbours: &Neighbours<'_>,
     spacing: f64,
     params: &SkinParams,
@@ -65,19 +68,18 @@ pub fn skins(
     if interior.is_empty() {
         return Skins::default();
     }
-    let above = Cover::new(interior, &neighbours.above, params.top_layers, spacing);
+    let above = Cover::new(interior, chart, &neighbours.above, params.top_layers, spacing);
     let sparse = if params.all_solid || !above.is_complete {
         Region::default()
     } else {
-        let below = Cover::new(interior, &neighbours.below, params.bottom_layers, spacing);
+        let below = Cover::new(interior, chart, &neighbours.below, params.bottom_layers, spacing);
         if below.is_complete {
-            above
+            let covered = above
                 .common
                 .intersection(&below.common)
                 .difference(&above.open)
-                .difference(&below.open)
-                .opened(spacing)
-                .without_small_islands(params.solid_below_area)
+                .difference(&below.open);
+            chart.opened(&covered, spacing).without_small_islands(params.solid_below_area)
         } else {
             Region::default()
         }
@@ -85,7 +87,7 @@ pub fn skins(
     let (solid, sparse) = if sparse.is_empty() {
         (interior.clone(), sparse)
     } else {
-        let solid = interior.difference(&sparse).opened(LEAST_SOLID_SHARE * spacing);
+        let solid = chart.opened(&interior.difference(&sparse), LEAST_SOLID_SHARE * spacing);
         let sparse = interior.difference(&solid);
         (solid, sparse)
     };
@@ -107,7 +109,13 @@ struct Cover {
 }
 
 impl Cover {
-    fn new(interior: &Region, layers: &[&Region], wanted: usize, spacing: f64) -> Self {
+    fn new(
+        interior: &Region,
+        chart: &Chart,
+        layers: &[&Region],
+        wanted: usize,
+        spacing: f64,
+    ) -> Self {
         let is_complete = layers.len() >= wanted;
         let Some(nearest) = layers.first() else {
             return Self { is_complete, common: Region::default(), open: interior.clone() };
@@ -116,8 +124,12 @@ impl Cover {
         let open = if interior.area() - common.area() <= NEGLIGIBLE_MM2 {
             Region::default()
         } else {
-            let bare = interior.difference(nearest).opened(spacing / 2.0);
-            if bare.is_empty() { bare } else { bare.outset(2.0 * spacing).intersection(interior) }
+            let bare = chart.opened(&interior.difference(nearest), spacing / 2.0);
+            if bare.is_empty() {
+                bare
+            } else {
+                chart.outset(&bare, 2.0 * spacing).intersection(interior)
+            }
         };
         if wanted == 0 {
             return Self { is_complete, common: interior.clone(), open: Region::default() };
@@ -159,7 +171,7 @@ mod tests {
     fn deep_inside_all_is_sparse() {
         let (interior, outline) = (square(18.0), square(20.0));
         let neighbours = Neighbours { above: vec![&outline; 3], below: vec![&outline; 2] };
-        let skins = skins(&interior, &neighbours, 0.4, &PARAMS);
+        let skins = skins(&interior, &Chart::Plane, &neighbours, 0.4, &PARAMS);
         assert!(skins.top.is_empty() && skins.solid.is_empty());
         assert!((skins.sparse.area() - 324.0).abs() < 0.1);
     }
@@ -168,14 +180,14 @@ mod tests {
     fn too_few_layers_above_or_below_make_it_solid() {
         let (interior, outline) = (square(18.0), square(20.0));
         let near_top = Neighbours { above: vec![&outline; 2], below: vec![&outline; 5] };
-        let near_top = skins(&interior, &near_top, 0.4, &PARAMS);
+        let near_top = skins(&interior, &Chart::Plane, &near_top, 0.4, &PARAMS);
         assert!(near_top.sparse.is_empty() && near_top.top.is_empty());
         check(&near_top, &interior);
         let topmost = Neighbours { above: vec![], below: vec![&outline; 5] };
-        let topmost = skins(&interior, &topmost, 0.4, &PARAMS);
+        let topmost = skins(&interior, &Chart::Plane, &topmost, 0.4, &PARAMS);
         assert!((topmost.top.area() - interior.area()).abs() < 1e-6);
         let bottom = Neighbours { above: vec![&outline; 3], below: vec![] };
-        let bottom = skins(&interior, &bottom, 0.4, &PARAMS);
+        let bottom = skins(&interior, &Chart::Plane, &bottom, 0.4, &PARAMS);
         assert!(bottom.top.is_empty() && bottom.sparse.is_empty());
     }
 
@@ -183,7 +195,7 @@ mod tests {
     fn a_step_is_solid_around_and_seen_from_above() {
         let (interior, outline, smaller) = (square(18.0), square(20.0), square(10.0));
         let neighbours = Neighbours { above: vec![&smaller; 3], below: vec![&outline; 2] };
-        let parts = skins(&interior, &neighbours, 0.4, &PARAMS);
+        let parts = skins(&interior, &Chart::Plane, &neighbours, 0.4, &PARAMS);
         check(&parts, &interior);
         // Two lines of 0.4 mm reach under the walls of the step.
         let covered = (10.0_f64 - 4.0 * 0.4).powi(2);
@@ -195,7 +207,13 @@ mod tests {
     fn all_solid_leaves_nothing_sparse() {
         let (interior, outline) = (square(18.0), square(20.0));
         let neighbours = Neighbours { above: vec![&outline; 3], below: vec![&outline; 2] };
-        let parts = skins(&interior, &neighbours, 0.4, &SkinParams { all_solid: true, ..PARAMS });
+        let parts = skins(
+            &interior,
+            &Chart::Plane,
+            &neighbours,
+            0.4,
+            &SkinParams { all_solid: true, ..PARAMS },
+        );
         assert!(parts.sparse.is_empty() && parts.top.is_empty());
         check(&parts, &interior);
     }

@@ -19,6 +19,7 @@ use geom::triangulate::{Triangulation, triangulate};
 use nalgebra::{Point2, center, distance};
 
 use self::rim::Rim;
+use crate::chart::Chart;
 use crate::toolpath::LostArea;
 
 /// The widths that a single bead may have.
@@ -62,17 +63,18 @@ const LEAST_LENGTH_IN_WIDTHS: f64 = 1.0;
 /// fits, and counts what none fits in.
 pub(crate) fn axes(
     region: &Region,
+    chart: &Chart,
     least: f64,
     greatest: f64,
     lost: &mut LostArea,
 ) -> Vec<Vec<AxisPoint>> {
     // Corners beside walls taper to nothing: an opening of the least width removes them, and with
     // them the triangles that would cost most.
-    let wide_enough = region.opened(least / 2.0);
-    lost.add(&region.difference(&wide_enough.outset(least / 2.0)));
+    let wide_enough = chart.opened(region, least / 2.0);
+    lost.add(&region.difference(&chart.outset(&wide_enough, least / 2.0)));
     let mut found = Vec::new();
     for island in wide_enough.islands() {
-        let axes = axes_of_island(island, least, greatest);
+        let axes = axes_of_island(island, chart, least, greatest);
         if axes.is_empty() {
             lost.add(&Region::from_island(island.clone()));
         }
@@ -81,7 +83,12 @@ pub(crate) fn axes(
     found
 }
 
-fn axes_of_island(island: &Island, least: f64, greatest: f64) -> Vec<Vec<AxisPoint>> {
+fn axes_of_island(
+    island: &Island,
+    chart: &Chart,
+    least: f64,
+    greatest: f64,
+) -> Vec<Vec<AxisPoint>> {
     let step = rim_step(island);
     let rings: Vec<Vec<Point2<f64>>> = island.iter().map(|ring| densified(ring, step)).collect();
     // Rings of a region never cross, so this fails only on rings that touch along a side within a
@@ -89,7 +96,7 @@ fn axes_of_island(island: &Island, least: f64, greatest: f64) -> Vec<Vec<AxisPoi
     let Ok(triangles) = triangulate(&rings) else { return Vec::new() };
     let rim = Rim::new(&rings);
     let points: Vec<Point2<f64>> = rings.into_iter().flatten().collect();
-    let graph = AxisGraph::new(&triangles, &points, &rim);
+    let graph = AxisGraph::new(&triangles, &points, &rim, chart);
     graph
         .branches()
         .into_iter()
@@ -131,7 +138,7 @@ struct AxisGraph {
 }
 
 impl AxisGraph {
-    fn new(triangles: &Triangulation, points: &[Point2<f64>], rim: &Rim) -> Self {
+    fn new(triangles: &Triangulation, points: &[Point2<f64>], rim: &Rim, chart: &Chart) -> Self {
         let mut graph = Self { nodes: Vec::new(), links: Vec::new() };
         // One node for each side between two triangles, made when its first triangle is met.
         let mut side_node = vec![[None; 3]; triangles.triangles.len()];
@@ -143,7 +150,7 @@ impl AxisGraph {
                 let Some(other) = neighbours[k] else { continue };
                 let node = *side_node[t][k].get_or_insert_with(|| {
                     let ends = [corners[k], corners[(k + 1) % 3]].map(|c| points[c as usize]);
-                    graph.add(center(&ends[0], &ends[1]), &ends[0], rim)
+                    graph.add(center(&ends[0], &ends[1]), &ends, rim, chart)
                 });
                 let back = triangles.neighbours[other as usize]
                     .iter()
@@ -159,7 +166,8 @@ impl AxisGraph {
                         + graph.nodes[b].at.coords
                         + graph.nodes[c].at.coords)
                         / 3.0;
-                    let hub = graph.add(middle.into(), &points[corners[0] as usize], rim);
+                    let ends = [corners[0], corners[1]].map(|c| points[c as usize]);
+                    let hub = graph.add(middle.into(), &ends, rim, chart);
                     for side in [a, b, c] {
                         graph.link(hub, side);
                     }
@@ -170,9 +178,19 @@ impl AxisGraph {
         graph
     }
 
-    /// Adds a node; `on_rim` is any point of the rim, best a near one.
-    fn add(&mut self, at: Point2<f64>, on_rim: &Point2<f64>, rim: &Rim) -> usize {
-        let width = 2.0 * rim.distance(&at, distance(&at, on_rim));
+    /// Adds a node; `across` is a line from rim to rim near it.
+    fn add(
+        &mut self,
+        at: Point2<f64>,
+        across: &[Point2<f64>; 2],
+        rim: &Rim,
+        chart: &Chart,
+    ) -> usize {
+        let [a, b] = across;
+        let in_chart = 2.0 * rim.distance(&at, distance(&at, a));
+        // Widths are measured across the place, where the chart may not be true.
+        let width =
+            if chart.is_flat() { in_chart } else { in_chart * chart.length(a, b) / distance(a, b) };
         self.nodes.push(AxisPoint { at, width });
         self.links.push(Vec::new());
         self.nodes.len() - 1
@@ -292,7 +310,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     fn axes(region: &Region, lost: &mut LostArea) -> Vec<Vec<AxisPoint>> {
-        super::axes(region, 0.2, 0.8, lost)
+        super::axes(region, &Chart::Plane, 0.2, 0.8, lost)
     }
 
     fn polygon(points: &[[f64; 2]]) -> Region {

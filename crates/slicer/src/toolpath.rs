@@ -76,7 +76,7 @@ pub struct WallGroup {
 /// Everything to be laid in one island of a layer.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct IslandPaths {
-    /// The island itself, in the chart of the layer: travel inside it crosses no outline.
+    /// The island itself, seen from above: travel inside it crosses no outline.
     pub outline: Region,
     /// Walls by outline: that of the island, then its holes.
     pub walls: Vec<WallGroup>,

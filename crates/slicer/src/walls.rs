@@ -19,6 +19,7 @@ use geom::region::{Island, Part, Region, Ring, ring_length, ring_sides, signed_a
 use nalgebra::Point2;
 
 use crate::bead::Bead;
+use crate::chart::Chart;
 use crate::toolpath::Role;
 
 /// How many walls, and how wide.
@@ -77,12 +78,12 @@ const INNER_TOLERANCE_MM: f64 = 0.005;
 
 /// Returns the walls of one island (a region with a single outer ring) for beads `thickness` thick.
 #[must_use]
-pub fn walls(island: &Region, thickness: f64, params: &WallParams) -> Walls {
+pub fn walls(island: &Region, chart: &Chart, thickness: f64, params: &WallParams) -> Walls {
     let mut walls = Walls { interior: island.clone(), ..Walls::default() };
     if params.count == 0 {
         // No wall keeps the round flanks of infill inside the outline.
         let bead = Bead { width: params.width, thickness };
-        walls.interior = island.inset((bead.width - bead.spacing()) / 2.0);
+        walls.interior = chart.inset(island, (bead.width - bead.spacing()) / 2.0);
     }
     for depth in 0..params.count {
         let (width, role) = match depth {
@@ -95,11 +96,11 @@ pub fn walls(island: &Region, thickness: f64, params: &WallParams) -> Walls {
             0 => width + LEAST_PAIR_SHARE * spacing,
             _ => 2.0 * spacing,
         };
-        let left = split(&walls.interior, spacing, least_pair);
+        let left = split(&walls.interior, chart, spacing, least_pair);
         if !left.thin.is_empty() {
             walls.thin.push(ThinPlace { region: left.thin, role });
         }
-        let lines = centreline(&left.thick, depth, params, thickness);
+        let lines = centreline(&left.thick, chart, depth, params, thickness);
         let tight = TightBeads::new(&left.tight, &lines, bead);
         for ring in lines.rings() {
             let wall = WallLoop { depth, points: tight.along(ring, bead) };
@@ -119,7 +120,13 @@ fn is_hole(ring: &Ring) -> bool {
 }
 
 /// The line that the nozzle follows inside what is left before wall `depth`.
-fn centreline(left: &Region, depth: usize, params: &WallParams, thickness: f64) -> Region {
+fn centreline(
+    left: &Region,
+    chart: &Chart,
+    depth: usize,
+    params: &WallParams,
+    thickness: f64,
+) -> Region {
     let external = Bead { width: params.external_width, thickness };
     let inner = Bead { width: params.width, thickness };
     let from_edge = match depth {
@@ -127,7 +134,7 @@ fn centreline(left: &Region, depth: usize, params: &WallParams, thickness: f64) 
         // Half a spacing, and what the edges behind the first wall moved towards the outline.
         _ => inner.spacing() / 2.0 + (external.width - external.spacing()) / 2.0,
     };
-    left.inset(from_edge)
+    chart.inset(left, from_edge)
 }
 
 /// A region taken apart by thickness.
@@ -152,14 +159,14 @@ const THIN_BORDER_MM: f64 = 0.01;
 const CORNER_RADIUS_MM: f64 = 0.04;
 
 /// Takes the places thinner than twice `spacing` out of a region.
-pub(crate) fn split_thin(region: &Region, spacing: f64) -> Split {
-    split(region, spacing, 2.0 * spacing)
+pub(crate) fn split_thin(region: &Region, chart: &Chart, spacing: f64) -> Split {
+    split(region, chart, spacing, 2.0 * spacing)
 }
 
 /// Takes the places thinner than `least_pair` out of a region; those thinner than twice `spacing`
 /// are tight.
-fn split(region: &Region, spacing: f64, least_pair: f64) -> Split {
-    let (core, loss) = region.inset_with_loss(spacing);
+fn split(region: &Region, chart: &Chart, spacing: f64, least_pair: f64) -> Split {
+    let (core, loss) = chart.inset_with_loss(region, spacing);
     let whole = |core| Split {
         thick: region.clone(),
         tight: Region::default(),
@@ -169,26 +176,27 @@ fn split(region: &Region, spacing: f64, least_pair: f64) -> Split {
     if loss <= NEGLIGIBLE_LOSS_MM2 {
         return whole(core);
     }
-    let narrow = out_of_reach(region, &core, spacing);
+    let narrow = out_of_reach(region, chart, &core, spacing);
     if narrow.is_empty() {
         return whole(core);
     }
     let (thin, tight) = if least_pair < 2.0 * spacing {
         let half = least_pair / 2.0;
-        let thin = out_of_reach(region, &region.inset(half), half);
+        let thin = out_of_reach(region, chart, &chart.inset(region, half), half);
         let tight = narrow.difference(&thin).filtered(holds_a_disc);
         (thin, tight)
     } else {
         (narrow, Region::default())
     };
     let thick = region.difference(&thin);
-    let core = thick.inset(spacing);
+    let core = chart.inset(&thick, spacing);
     Split { thick, tight, thin, core }
 }
 
 /// The places of a region that its inset does not reach when it grows by `distance` again.
-fn out_of_reach(region: &Region, inset: &Region, distance: f64) -> Region {
-    let reached = inset.thinned(THIN_BORDER_MM).outset_sharp(distance + 2.0 * THIN_BORDER_MM);
+fn out_of_reach(region: &Region, chart: &Chart, inset: &Region, distance: f64) -> Region {
+    let grown = distance + 2.0 * THIN_BORDER_MM;
+    let reached = chart.outset_sharp(&inset.thinned(THIN_BORDER_MM), grown);
     region.difference(&reached).filtered(holds_a_disc)
 }
 
@@ -322,7 +330,7 @@ mod tests {
     #[test]
     fn walls_and_interior_take_the_area_of_the_island() {
         let island = rectangle(20.0, 20.0);
-        let walls = walls(&island, 0.2, &PARAMS);
+        let walls = walls(&island, &Chart::Plane, 0.2, &PARAMS);
         assert_eq!(walls.groups.len(), 1);
         assert!(walls.thin.is_empty());
         let laid: f64 = walls.groups.iter().flatten().map(taken).sum();
@@ -334,7 +342,7 @@ mod tests {
 
     #[test]
     fn the_outer_centreline_is_half_a_width_inside() {
-        let walls = walls(&rectangle(20.0, 10.0), 0.2, &PARAMS);
+        let walls = walls(&rectangle(20.0, 10.0), &Chart::Plane, 0.2, &PARAMS);
         let outer = &walls.groups[0][0];
         assert_eq!(outer.depth, 0);
         for p in &outer.positions() {
@@ -354,7 +362,7 @@ mod tests {
             [15.0, 15.0],
             [5.0, 15.0],
         ]));
-        let walls = walls(&frame, 0.2, &PARAMS);
+        let walls = walls(&frame, &Chart::Plane, 0.2, &PARAMS);
         assert_eq!(walls.groups.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2]);
         let sign = |k: usize| area_sign(&walls.groups[k][0].positions());
         assert_eq!(sign(0) * sign(1), -1.0);
@@ -373,7 +381,7 @@ mod tests {
             [10.0, 10.0],
             [0.0, 10.0],
         ]);
-        let walls = walls(&plate, 0.2, &PARAMS);
+        let walls = walls(&plate, &Chart::Plane, 0.2, &PARAMS);
         let external: Vec<_> =
             walls.thin.iter().filter(|t| t.role == Role::ExternalPerimeter).collect();
         assert_eq!(external.len(), 1);
@@ -389,7 +397,7 @@ mod tests {
         // 0.75 mm hold two outer beads only when they overlap.
         for (width, height) in [(30.0, 0.75), (30.0, 0.8), (12.0, 0.72)] {
             let strip = rectangle(width, height);
-            let walls = walls(&strip, 0.2, &PARAMS);
+            let walls = walls(&strip, &Chart::Plane, 0.2, &PARAMS);
             assert!(walls.thin.is_empty() && walls.interior.is_empty());
             assert_eq!(walls.groups.len(), 1);
             let taken: f64 = walls.groups.iter().flatten().map(taken).sum();
@@ -400,7 +408,7 @@ mod tests {
         let dumbbell = rectangle(10.0, 10.0)
             .union(&polygon(&[[20.0, 0.0], [30.0, 0.0], [30.0, 10.0], [20.0, 10.0]]))
             .union(&polygon(&[[9.0, 4.6], [21.0, 4.6], [21.0, 5.35], [9.0, 5.35]]));
-        let walls = walls(&dumbbell, 0.2, &PARAMS);
+        let walls = walls(&dumbbell, &Chart::Plane, 0.2, &PARAMS);
         assert_eq!(walls.groups.iter().filter(|group| group[0].depth == 0).count(), 1);
         let outer = &walls.groups[0][0];
         let narrow = outer.points.iter().filter(|(p, _)| (12.0..18.0).contains(&p.x));
@@ -409,7 +417,7 @@ mod tests {
 
     #[test]
     fn a_wall_too_thin_for_any_loop_is_all_thin() {
-        let walls = walls(&rectangle(20.0, 0.5), 0.2, &PARAMS);
+        let walls = walls(&rectangle(20.0, 0.5), &Chart::Plane, 0.2, &PARAMS);
         assert!(walls.groups.is_empty() && walls.interior.is_empty());
         assert!((walls.thin[0].region.area() - 10.0).abs() < 1e-6);
     }

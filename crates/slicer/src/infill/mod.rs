@@ -20,6 +20,7 @@ use nalgebra::Point2;
 
 use self::link::JoinParams;
 use crate::bead::Bead;
+use crate::chart::Chart;
 use crate::skins::Skins;
 use crate::toolpath::Role;
 
@@ -34,6 +35,16 @@ pub enum Pattern {
     Concentric,
     /// The Archimedean spiral about the rotation axis.
     Archimedean,
+}
+
+impl Pattern {
+    /// Returns the pattern that takes the place of this one in the solid areas of a curved layer.
+    fn evenly_curved(self) -> Self {
+        match self {
+            Self::Concentric => Self::Concentric,
+            Self::Rectilinear | Self::Grid | Self::Archimedean => Self::Archimedean,
+        }
+    }
 }
 
 /// How areas are filled.
@@ -93,6 +104,8 @@ pub(crate) struct Chord {
 pub struct FillLayer {
     /// Counted from 0; patterns alternate with it.
     pub index: usize,
+    /// Metric of its chart.
+    pub chart: Chart,
     /// Thickness of the beads, mm.
     pub thickness: f64,
     /// How far lines may lie from their ideal course, mm.
@@ -151,7 +164,13 @@ fn solid(
 ) {
     let bead = Bead { width, thickness: layer.thickness };
     let area = Region::from_island(island.clone());
-    match params.solid_pattern {
+    // Straight lines of a curved chart are not equally far apart everywhere; turns of the spiral are.
+    let pattern = if layer.chart.is_flat() {
+        params.solid_pattern
+    } else {
+        params.solid_pattern.evenly_curved()
+    };
+    match pattern {
         Pattern::Rectilinear | Pattern::Grid => {
             let even = rectilinear::evenly(&area, bead.spacing(), angle_in(layer, params));
             let bead = Bead::with_spacing(even.spacing, layer.thickness);
@@ -159,12 +178,12 @@ fn solid(
             filling.lines.extend(open_lines(core, chords, &SOLID_JOINS, role, bead, layer));
         }
         Pattern::Concentric => {
-            let (loops, thin) = concentric::solid(&area, bead.spacing());
+            let (loops, thin) = concentric::solid(&area, &layer.chart, bead.spacing());
             filling.lines.extend(closed_lines(loops, role, bead));
             filling.thin.extend(thin);
         }
         Pattern::Archimedean => {
-            let core = area.inset(bead.spacing() / 2.0);
+            let core = layer.chart.inset(&area, bead.spacing() / 2.0);
             // Turns of neighbouring layers lie in each other's grooves.
             let phase = if layer.index.is_multiple_of(2) { 0.0 } else { std::f64::consts::PI };
             let turning = turning(layer.index);
@@ -182,7 +201,7 @@ fn sparse(area: &Region, layer: &FillLayer, params: &InfillParams) -> Vec<FillLi
     let role = Role::InternalInfill;
     let bead = Bead { width: params.width, thickness: layer.thickness };
     let spacing = bead.spacing() / params.density;
-    let core = area.inset(bead.spacing() / 2.0);
+    let core = layer.chart.inset(area, bead.spacing() / 2.0);
     let parallel = |spacing: f64, angle: f64| {
         let chords = rectilinear::about_axis(&core, spacing, angle);
         open_lines(&core, &chords, &SPARSE_JOINS, role, bead, layer)
@@ -195,7 +214,7 @@ fn sparse(area: &Region, layer: &FillLayer, params: &InfillParams) -> Vec<FillLi
             lines
         }
         Pattern::Concentric => {
-            let loops = concentric::sparse(area, bead.spacing() / 2.0, spacing);
+            let loops = concentric::sparse(area, &layer.chart, bead.spacing() / 2.0, spacing);
             closed_lines(loops, role, bead).collect()
         }
         Pattern::Archimedean => {
@@ -237,7 +256,8 @@ mod tests {
     use geom::region::Fill;
     use std::f64::consts::{FRAC_PI_4, TAU};
 
-    const LAYER: FillLayer = FillLayer { index: 0, thickness: 0.2, tolerance: 0.002 };
+    const LAYER: FillLayer =
+        FillLayer { index: 0, chart: Chart::Plane, thickness: 0.2, tolerance: 0.002 };
 
     const PARAMS: InfillParams = InfillParams {
         density: 0.2,
