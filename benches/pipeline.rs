@@ -17,12 +17,14 @@ use mesh::topology::Solid;
 use rayon::prelude::*;
 use rhumb::check::check;
 use rhumb::interrupt::Interrupt;
+use rhumb::levels::layout;
 use rhumb::pipeline::{Outcome, Request, Watch, part, slice};
 use rhumb::place::{Wish, place};
 use rhumb::progress::Silent;
 use rhumb::settings::{Job, Settings};
 use slicer::layer::fill_layer;
-use slicer::level::{Level, schedule};
+use slicer::level::Level;
+use slicer::lift::Lift;
 use slicer::section::Cutter;
 use slicer::skins::{Neighbours, SKIN_TOLERANCE_MM};
 use slicer::surface::Plane;
@@ -59,7 +61,8 @@ fn filled(model: &Model, covers: &[Region], job: &Job) -> usize {
             below: covers[k.saturating_sub(skins.bottom_layers)..k].iter().rev().collect(),
         };
         let material = &model.sections[k];
-        fill_layer(&model.levels[k], material, &neighbours, &Plane, &job.paths).paths.islands.len()
+        let lift = Lift { surface: &Plane, level: model.levels[k], floor: None };
+        fill_layer(&lift, material, &neighbours, &job.paths).paths.islands.len()
     };
     (0..covers.len()).into_par_iter().map(layer).sum()
 }
@@ -76,7 +79,7 @@ fn whole(bytes: &[u8], settings: &Settings, job: &Job) -> (Vec<u8>, Outcome) {
 fn model(name: &'static str, path: &Path, settings: &Settings, job: &Job) -> Option<Model> {
     let bytes = std::fs::read(path).ok()?;
     let solid = place(&read(&bytes), &Wish::default(), &job.orient).solid;
-    let levels = schedule(solid.mesh().bounds().max.z, &job.schedule);
+    let levels = layout(solid.mesh(), &Plane, job).unwrap().levels;
     let sections = sections(&solid, &levels, job);
     let (program, outcome) = whole(&bytes, settings, job);
     Some(Model { name, bytes, solid, levels, sections, program, outcome })

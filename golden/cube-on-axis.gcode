@@ -672,6 +672,7 @@ M84
 ; max_nozzle_temperature = 280
 ; min_extrude_temperature = 170
 ; max_bed_temperature = 110
+; z_increment = 0.005
 ; filament_type = PLA
 ; filament_diameter = 1.75
 ; filament_density = 1.24
@@ -692,6 +693,12 @@ M84
 ; min_print_speed = 10
 ; layer_height = 0.2
 ; first_layer_height = 0.2
+; snap = optimal
+; flat_area_min = 1
+; flat_depth = 0.01
+; adaptive_layer_height = 0
+; cusp = 0.1
+; cusp_area_share = 0%
 ; perimeters = 2
 ; external_perimeters_first = 0
 ; seam_position = nearest

@@ -15,7 +15,7 @@
 //! writes files; [`weld`] joins corners; [`topology`] finds sides and shells; [`repair`] closes
 //! and turns; [`overlap`] finds surfaces that cross; [`health`] does it all and sums it up in
 //! [`note`]s; [`measure`] gives volumes and moments; [`orient`] and [`place`] put a part on the
-//! bed; [`shapes`] are solids that are known exactly.
+//! bed; [`flats`] are the faces that its layers should meet; [`shapes`] are solids that are known exactly.
 //!
 //! Lengths are millimetres, angles radians. Everything up to [`orient`] is in the Model frame, as
 //! in the file; [`place`] leads to the Part frame. The same facets give the same solid, bit for
@@ -32,6 +32,7 @@
 //! assert!(health.with_read(&read).notes.is_empty());
 //! ```
 
+pub mod flats;
 mod groups;
 pub mod health;
 mod inside;

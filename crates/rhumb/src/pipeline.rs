@@ -20,7 +20,7 @@ use nalgebra::Rotation3;
 use plan::planner::{Planner, Totals};
 use rayon::prelude::*;
 use slicer::layer::{Filled, fill_layer};
-use slicer::level::{Level, expected_count, schedule};
+use slicer::level::Level;
 use slicer::lift::Lift;
 use slicer::section::{Cutter, Section, Tears};
 use slicer::skins::{Neighbours, SKIN_TOLERANCE_MM};
@@ -29,6 +29,7 @@ use slicer::toolpath::LostArea;
 
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
+use crate::levels::{Layout, layout};
 use crate::output;
 use crate::place::{Fit, Placed, Wish, check_envelope, place, suspect_units};
 use crate::program_text;
@@ -67,8 +68,8 @@ pub struct Outcome {
     pub health: Health,
     /// Where it was put.
     pub placed: Placed,
-    /// The layers.
-    pub levels: Vec<Level>,
+    /// The layers, and the flat faces that they meet.
+    pub layout: Layout,
     /// The sums of the program.
     pub totals: Totals,
     /// Area that no bead fits in.
@@ -108,7 +109,9 @@ pub fn slice(
     drop(solid);
     let orient_ms = clock.lap();
 
-    let levels = levels(&placed, job)?;
+    let layout = layout(placed.solid.mesh(), &Plane, job)?;
+    warnings.extend(layout.warnings(job.schedule.snap));
+    let schedule_ms = clock.lap();
     // The slicer works in a frame that turns with the part, so that its choices do too.
     let turned = Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), -placed.azimuth);
     let upright = placed.solid.moved(|p| turned * p);
@@ -116,12 +119,12 @@ pub fn slice(
     job.plan.resample.azimuth = placed.azimuth;
     let mut text = Emitter::new(out, job.dialect);
     program_text::head(&mut text, request.name, request.made_at, &job.start).map_err(written)?;
-    let printed = layers(&upright, &levels, &job, &mut text, watch)?;
+    let printed = layers(&upright, &layout.levels, &job, &mut text, watch)?;
     program_text::tail(
         &mut text,
         &job.end,
         &printed.totals,
-        &program_text::Material::of(&job, levels.len()),
+        &program_text::Material::of(&job, layout.levels.len()),
         request.settings,
     )
     .map_err(written)?;
@@ -131,11 +134,12 @@ pub fn slice(
         read: read_ms,
         repair: repair_ms,
         orient: orient_ms,
+        schedule: schedule_ms,
         slice: clock.lap(),
         ..Timings::default()
     };
     let Printed { totals, lost, .. } = printed;
-    Ok(Outcome { health, placed, levels, totals, lost, warnings, timings })
+    Ok(Outcome { health, placed, layout, totals, lost, warnings, timings })
 }
 
 fn unusable(class: &'static str, error: &dyn std::error::Error, hint: Option<String>) -> Failure {
@@ -184,21 +188,6 @@ fn placement_warnings(solid: &Solid, placed: &Placed, fit: Fit, job: &Job) -> Ve
 
 /// How far above or below z = 0 a model may stand without a word, mm.
 const RECENTRED_MM: f64 = 0.01;
-
-/// More layers than any printer lays: a setting or a unit is wrong.
-const MOST_LAYERS: f64 = 100_000.0;
-
-fn levels(placed: &Placed, job: &Job) -> Result<Vec<Level>, Failure> {
-    let height = placed.solid.mesh().bounds().max.z;
-    let expected = expected_count(height, &job.schedule);
-    if expected > MOST_LAYERS {
-        return Err(Failure::new(
-            "LimitExceeded",
-            format!("{expected:.0} layers are too many; the limit is {MOST_LAYERS}"),
-        ));
-    }
-    Ok(schedule(height, &job.schedule))
-}
 
 /// Layers that are worked at once. Enough to keep all threads busy; a window of a fine model is a
 /// few megabytes.

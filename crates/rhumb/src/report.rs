@@ -109,6 +109,10 @@ pub struct Flat {
     pub area_mm2: f64,
     /// Distance of the nearest layer.
     pub error_mm: f64,
+    /// `up` or `down`.
+    pub facing: &'static str,
+    /// Whether it is too small to be met on purpose.
+    pub ignored: bool,
 }
 
 /// The print.
@@ -167,6 +171,8 @@ pub struct Timings {
     pub repair: f64,
     /// Orientation and placement.
     pub orient: f64,
+    /// Flat faces and levels of the layers.
+    pub schedule: f64,
     /// Sections, toolpaths, plan and text.
     pub slice: f64,
     /// Reading the program back.

@@ -47,10 +47,10 @@ pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Jo
         orientation: orientation(outcome, job),
         layers: Layers {
             kind: "planar",
-            count: outcome.levels.len(),
-            levels_mm: outcome.levels.iter().map(|level| tidy(level.upper)).collect(),
-            heights_mm: outcome.levels.iter().map(|level| tidy(level.thickness())).collect(),
-            flats: Vec::new(),
+            count: outcome.layout.levels.len(),
+            levels_mm: outcome.layout.levels.iter().map(|level| tidy(level.upper)).collect(),
+            heights_mm: outcome.layout.levels.iter().map(|level| tidy(level.thickness())).collect(),
+            flats: outcome.layout.report(),
             lost_mm2: outcome.lost.area,
         },
         print: Print {
@@ -127,7 +127,10 @@ pub fn text(
             resting(outcome)
         ),
     );
-    row("layers", format!("{} of {} mm", report.layers.count, heights(job)));
+    row("layers", format!("{} of {} mm", report.layers.count, heights(report, job)));
+    if let Some(flats) = outcome.layout.summary() {
+        row("flat faces", flats);
+    }
     row("time", duration(report.print.time_s));
     row(
         "filament",
@@ -164,8 +167,9 @@ pub fn text(
         row(
             "ms",
             format!(
-                "read {:.0}, repair {:.0}, orient {:.0}, slice {:.0}, verify {:.0}, total {:.0}",
-                t.read, t.repair, t.orient, t.slice, t.verify, t.total
+                "read {:.0}, repair {:.0}, orient {:.0}, schedule {:.0}, slice {:.0}, verify {:.0}, \
+                 total {:.0}",
+                t.read, t.repair, t.orient, t.schedule, t.slice, t.verify, t.total
             ),
         );
     }
@@ -173,16 +177,22 @@ pub fn text(
     out
 }
 
-fn heights(job: &Job) -> String {
-    let schedule = &job.schedule;
-    if schedule.first_layer_height == schedule.layer_height {
-        decimal(schedule.layer_height, 3)
+/// The heights of the layers above the first, and the first where it is another.
+fn heights(report: &Report, job: &Job) -> String {
+    let heights = &report.layers.heights_mm;
+    let above = heights.get(1..).filter(|above| !above.is_empty()).unwrap_or(heights);
+    let least = above.iter().copied().fold(f64::INFINITY, f64::min);
+    let greatest = above.iter().copied().fold(0.0, f64::max);
+    let range = if least == greatest {
+        decimal(greatest, 3)
     } else {
-        format!(
-            "{} (the first {})",
-            decimal(schedule.layer_height, 3),
-            decimal(schedule.first_layer_height, 3)
-        )
+        format!("{} to {}", decimal(least, 3), decimal(greatest, 3))
+    };
+    match heights.first() {
+        Some(first) if job.schedule.first_layer_height != job.schedule.layer_height => {
+            format!("{range} (the first {})", decimal(*first, 3))
+        }
+        _ => range,
     }
 }
 

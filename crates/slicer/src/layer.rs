@@ -128,7 +128,7 @@ fn fill_island(
         });
         WallGroup { loops: loops.collect() }
     });
-    (IslandPaths { walls: groups.collect(), outline: frame.from_above(outline), fills }, lost)
+    (IslandPaths { walls: groups.collect(), outline: frame.seen_from_above(outline), fills }, lost)
 }
 
 fn single_beads(
@@ -191,7 +191,7 @@ impl<'a> Frame<'a> {
     }
 
     /// A region of the chart as it is seen from above.
-    fn from_above(&self, region: Region) -> Region {
+    fn seen_from_above(&self, region: Region) -> Region {
         if self.chart.is_flat() {
             return region;
         }

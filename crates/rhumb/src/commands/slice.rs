@@ -3,6 +3,7 @@
 use std::io::{BufReader, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
+use slicer::level::Snap;
 use twin::verify::Verdict;
 
 use super::{DONE, LOOK, display_name, say, say_json, settings, to_json, wish};
@@ -80,7 +81,8 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     }
     out.commit()?;
     tell(&report, &outcome, verdict.as_ref(), &job, &target, manner)?;
-    let needs_a_look = !report.verify.findings.is_empty() || outcome.health.guessed;
+    let misses_flats = job.schedule.snap != Snap::Off && outcome.layout.missed().next().is_some();
+    let needs_a_look = !report.verify.findings.is_empty() || outcome.health.guessed || misses_flats;
     Ok(if needs_a_look { LOOK } else { DONE })
 }
 

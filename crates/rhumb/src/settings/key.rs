@@ -390,6 +390,13 @@ pub const KEYS: &[Key] = &[
         (110.0, 0.0, 200.0),
         "hottest bed allowed",
     ),
+    number(
+        Printer,
+        "z_increment_mm",
+        "z_increment",
+        (0.005, 0.001, 0.5),
+        "what the lift moves by; layer heights are whole multiples of it, unless snap = off",
+    ),
     text(
         Printer,
         "start_gcode",
@@ -501,6 +508,49 @@ pub const KEYS: &[Key] = &[
         "first_layer_height",
         (0.2, 0.01, 2.0),
         "thickness of the first layer",
+    ),
+    choice(
+        Print,
+        "snap",
+        &["optimal", "greedy", "off"],
+        "whether layers end on the flat faces of the part: on all that can be met, by the \
+         published rule, or not",
+    ),
+    number(
+        Print,
+        "flat_area_min_mm2",
+        "flat_area_min",
+        (1.0, 0.0, 100_000.0),
+        "flat faces smaller than this are not looked for",
+    ),
+    number(
+        Print,
+        "flat_depth_mm",
+        "flat_depth",
+        (0.01, 0.0001, 0.5),
+        "how far the facets of one flat face may lie from its height",
+    ),
+    Key {
+        name: "adaptive",
+        section: Print,
+        kind: Kind::Switch,
+        default: Default::Switch(false),
+        program_name: "adaptive_layer_height",
+        meaning: "whether layers are as thick as the slopes and the printer bear, instead of \
+                  layer_height_mm",
+    },
+    number(
+        Print,
+        "cusp_mm",
+        "cusp",
+        (0.1, 0.001, 2.0),
+        "highest stair step on a slope when layers are adaptive",
+    ),
+    share(
+        Print,
+        "cusp_area_share",
+        0.0,
+        "share of the area of a layer that may have higher stair steps",
     ),
     count(Print, "perimeters", (2, 0, 100), "number of walls"),
     Key {
@@ -701,7 +751,7 @@ pub const KEYS: &[Key] = &[
         "flat_angle_deg",
         "flat_angle",
         (1.0, 0.01, 20.0),
-        "facets within this angle count as one flat face when the part is laid on the bed",
+        "facets within this angle count as one flat face",
     ),
 ];
 

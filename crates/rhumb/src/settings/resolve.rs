@@ -5,6 +5,7 @@ use machine::gcode::Dialect;
 use machine::kinematics::Alignment;
 use machine::profile::{Axis, Printer, Turntable};
 use machine::program::{BedTurn, Joints};
+use mesh::flats::FlatParams;
 use mesh::orient::OrientParams;
 use plan::cooling::CoolingParams;
 use plan::order::OrderParams;
@@ -15,7 +16,8 @@ use plan::seam::SeamPosition;
 use slicer::adhesion::AdhesionParams;
 use slicer::infill::{InfillParams, Pattern};
 use slicer::layer::PathParams;
-use slicer::level::ScheduleParams;
+use slicer::level::adaptive::AdaptiveParams;
+use slicer::level::{ScheduleParams, Snap};
 use slicer::skins::SkinParams;
 use slicer::thin::ThinParams;
 use slicer::walls::WallParams;
@@ -34,6 +36,10 @@ pub struct Job {
     pub dialect: Dialect,
     /// What counts as one flat face.
     pub orient: OrientParams,
+    /// Which faces are flat.
+    pub flats: FlatParams,
+    /// Flat faces smaller than this need not be met, mm².
+    pub least_flat_mm2: f64,
     /// Where layers lie.
     pub schedule: ScheduleParams,
     /// How layers are filled.
@@ -68,10 +74,12 @@ impl Job {
                 class_tolerance_rad: get.number("flat_angle_deg").to_radians(),
                 overhang_rad: get.number("overhang_angle_deg").to_radians(),
             },
-            schedule: ScheduleParams {
-                first_layer_height: get.number("first_layer_height_mm"),
-                layer_height: get.number("layer_height_mm"),
+            flats: FlatParams {
+                angle_rad: get.number("flat_angle_deg").to_radians(),
+                depth_mm: get.number("flat_depth_mm"),
             },
+            least_flat_mm2: get.number("flat_area_min_mm2"),
+            schedule: schedule(&get)?,
             paths: paths(&get, &printer, &tolerances),
             plan: plan(&get, dialect, &tolerances),
             density_g_per_mm3: get.number("filament_density_g_per_cm3") / 1000.0,
@@ -192,6 +200,56 @@ const WIDTHS: [&str; 5] = [
     "solid_infill_extrusion_width_mm",
     "top_infill_extrusion_width_mm",
 ];
+
+fn schedule(get: &Lookup<'_>) -> Result<ScheduleParams, Failure> {
+    // A bead is no bead when it is thicker than wide.
+    let narrowest = WIDTHS.iter().map(|name| get.number(name)).fold(f64::INFINITY, f64::min);
+    let params = ScheduleParams {
+        first_layer_height: get.number("first_layer_height_mm"),
+        layer_height: get.number("layer_height_mm"),
+        least_height: get.number("min_layer_height_mm"),
+        greatest_height: get.number("max_layer_height_mm").min(narrowest),
+        increment: get.number("z_increment_mm"),
+        snap: match get.text("snap") {
+            "greedy" => Snap::Greedy,
+            "off" => Snap::Off,
+            _ => Snap::Optimal,
+        },
+        adaptive: get.switch("adaptive").then(|| AdaptiveParams {
+            cusp: get.number("cusp_mm"),
+            area_share: get.number("cusp_area_share"),
+            growth: CAP_GROWTH,
+        }),
+    };
+    if params.snap == Snap::Optimal || params.adaptive.is_some() {
+        check_increment(&params)?;
+    }
+    Ok(params)
+}
+
+/// How much thicker layers of an adaptive schedule may become per mm of height: a layer of 0.2 mm
+/// is followed by one of at most 0.22 mm. More, and the change is seen on the part; less, and thin
+/// layers reach far beyond the slope that asks for them.
+const CAP_GROWTH: f64 = 0.1;
+
+fn check_increment(params: &ScheduleParams) -> Result<(), Failure> {
+    let (least, greatest) = (params.least_height, params.greatest_height);
+    // Limits may be off by the rounding of their decimals.
+    const NOISE: f64 = 1e-6;
+    let thickest = (greatest / params.increment + NOISE).floor() * params.increment;
+    if thickest + NOISE * params.increment < least {
+        return Err(Failure::new(
+            "ConfigConflict",
+            format!(
+                "no multiple of z_increment_mm = {} lies between {least} and {greatest} mm, the \
+                 limits of a layer",
+                params.increment
+            ),
+        )
+        .hint("min_layer_height_mm and max_layer_height_mm belong to the printer settings"));
+    }
+    Ok(())
+}
 
 fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathParams {
     let density = get.number("fill_density");
@@ -358,6 +416,8 @@ mod tests {
         assert_eq!(class(&["chord_mm=0.001"]), "ConfigConflict");
         assert_eq!(class(&["rail_min_mm=200"]), "ConfigConflict");
         assert_eq!(class(&["home_z_mm=300"]), "ConfigConflict");
+        assert_eq!(class(&["z_increment_mm=0.35"]), "ConfigConflict");
+        assert!(resolve(&["z_increment_mm=0.35", "snap=off"]).is_ok());
         assert_eq!(class(&["start_gcode=M109 S{no}"]), "ConfigUnknownKey");
         assert!(resolve(&["fill_density=100%"]).unwrap().paths.skins.all_solid);
     }

@@ -1,0 +1,205 @@
+//! Horizontal flat faces of a part: what a print must meet exactly to measure what the drawing
+//! says.
+//!
+//! A flat face is made of facets that face straight up, or straight down, at one height. Part
+//! frame, mm. Faces at one height are one, connected or not: one layer meets them all. Normals are
+//! those of the corners; what a file says of them plays no part.
+//!
+//! Two tolerances. The *angle* is for facets: small facets of a scanned or finely tessellated flat
+//! lean by chance. The *depth* is for heights: all corners of a facet, and all facets of a face,
+//! lie within a slab of twice the depth. A facet that leans little but is large leaves the slab
+//! and is a slope; so is a run of small facets that climbs through many slabs, such as a ramp of
+//! half a degree or the top of a large dome, unless one slab holds most of it.
+
+use crate::mesh::Mesh;
+use rayon::prelude::*;
+
+/// Which way a face looks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Facing {
+    /// To the bed.
+    Down,
+    /// Away from it.
+    Up,
+}
+
+/// A flat face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flat {
+    /// Its height: the mean over its area, mm.
+    pub z_mm: f64,
+    /// Its area, mm².
+    pub area_mm2: f64,
+    /// Which way it looks.
+    pub facing: Facing,
+}
+
+/// What counts as flat.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlatParams {
+    /// Facets lean by at most this from the horizontal, rad. Usual: 1°. Smaller, and a rough flat
+    /// falls apart; larger, and the first facets of a dome belong to its top.
+    pub angle_rad: f64,
+    /// Heights differ by at most this from that of the face, mm. Usual: 0.01. Smaller, and noise
+    /// splits a face; larger than half of a layer, and steps that layers could show become one.
+    pub depth_mm: f64,
+}
+
+/// A run of facets is a face when one slab holds this share of its area; otherwise it is a slope.
+const LEAST_SHARE_OF_RUN: f64 = 0.5;
+
+/// A facet that may belong to a face.
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    z: f64,
+    area: f64,
+    facing: Facing,
+}
+
+/// Returns the flat faces, from the bed up; of two at one height the one that looks down is first.
+///
+/// The cost is one pass over the facets and a sort of those that are nearly horizontal.
+#[must_use]
+pub fn flats(mesh: &Mesh, params: &FlatParams) -> Vec<Flat> {
+    let facets = (0..mesh.triangles.len() as u32).into_par_iter();
+    let mut facets: Vec<Level> = facets.filter_map(|facet| level(mesh, facet, params)).collect();
+    // All of the key, so that sums do not depend on the order of the facets.
+    facets.par_sort_unstable_by(|a, b| {
+        a.facing.cmp(&b.facing).then(a.z.total_cmp(&b.z)).then(a.area.total_cmp(&b.area))
+    });
+    let one_run = |a: &Level, b: &Level| a.facing == b.facing && b.z - a.z <= params.depth_mm;
+    let mut flats: Vec<Flat> =
+        facets.chunk_by(one_run).filter_map(|run| face(run, params.depth_mm)).collect();
+    flats.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm).then(a.facing.cmp(&b.facing)));
+    flats
+}
+
+/// A facet that is nearly horizontal; `None` for others.
+fn level(mesh: &Mesh, facet: u32, params: &FlatParams) -> Option<Level> {
+    let twice = mesh.area_vector(facet);
+    let area = twice.norm() / 2.0;
+    let heights = mesh.corners(facet).map(|p| p.z);
+    let least = heights.iter().copied().fold(f64::INFINITY, f64::min);
+    let greatest = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let is_level = twice.z.abs() >= 2.0 * area * params.angle_rad.cos()
+        && greatest - least <= 2.0 * params.depth_mm
+        && area > 0.0;
+    let facing = if twice.z < 0.0 { Facing::Down } else { Facing::Up };
+    is_level.then(|| Level { z: heights.iter().sum::<f64>() / 3.0, area, facing })
+}
+
+/// The face in a run of facets, by height, without gaps larger than the depth.
+fn face(run: &[Level], depth: f64) -> Option<Flat> {
+    let all: f64 = run.iter().map(|facet| facet.area).sum();
+    let slab = heaviest_slab(run, 2.0 * depth);
+    let area: f64 = slab.iter().map(|facet| facet.area).sum();
+    if area < LEAST_SHARE_OF_RUN * all {
+        return None;
+    }
+    // Relative to the lowest: the height of a face of one height is exactly that.
+    let base = slab[0].z;
+    let above: f64 = slab.iter().map(|facet| (facet.z - base) * facet.area).sum();
+    Some(Flat { z_mm: base + above / area, area_mm2: area, facing: slab[0].facing })
+}
+
+/// The facets of the slab of a height with the most area; the lowest of several.
+fn heaviest_slab(run: &[Level], height: f64) -> &[Level] {
+    let (mut best, mut most) = (0..0, f64::NEG_INFINITY);
+    let (mut start, mut area) = (0, 0.0);
+    for (end, facet) in run.iter().enumerate() {
+        area += facet.area;
+        while facet.z - run[start].z > height {
+            area -= run[start].area;
+            start += 1;
+        }
+        if area > most {
+            (best, most) = (start..end + 1, area);
+        }
+    }
+    &run[best]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shapes;
+    use nalgebra::{Isometry3, Point3, Vector3};
+
+    const USUAL: FlatParams =
+        FlatParams { angle_rad: std::f64::consts::PI / 180.0, depth_mm: 0.01 };
+
+    fn found(mesh: &Mesh) -> Vec<(f64, f64, Facing)> {
+        let rounded = |x: f64| (x * 1e6).round() / 1e6;
+        let flats = flats(mesh, &USUAL);
+        flats.iter().map(|f| (rounded(f.z_mm), rounded(f.area_mm2), f.facing)).collect()
+    }
+
+    #[test]
+    fn a_stepped_block_has_its_steps() {
+        let steps = [(0.0, 1152.0, Facing::Down)]
+            .into_iter()
+            .chain([3.07, 7.33, 11.9, 15.0].map(|z| (z, 288.0, Facing::Up)));
+        assert_eq!(found(&shapes::steps()), steps.collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_cross_has_ceilings_too() {
+        let wanted = [
+            (0.0, 400.0, Facing::Down),
+            (20.0, 1600.0, Facing::Down),
+            (40.0, 1600.0, Facing::Up),
+            (60.0, 400.0, Facing::Up),
+        ];
+        assert_eq!(found(&shapes::cross(20.0)), wanted);
+    }
+
+    #[test]
+    fn round_parts_have_none() {
+        assert!(found(&shapes::icosphere(4, 20.0)).is_empty());
+        assert!(found(&Mesh::default()).is_empty());
+    }
+
+    /// A strip of facets that rises by `rise` over each of `n` squares of 1 mm.
+    fn ramp(n: usize, rise: impl Fn(usize) -> f64) -> Mesh {
+        let mut mesh = Mesh::default();
+        let mut z = 1.0;
+        for i in 0..=n {
+            let x = i as f64;
+            mesh.vertices.extend([Point3::new(x, 0.0, z), Point3::new(x, 1.0, z)]);
+            z += rise(i);
+        }
+        for i in 0..n as u32 {
+            let [a, b, c, d] = [2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1];
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+        mesh
+    }
+
+    #[test]
+    fn a_gentle_ramp_is_no_flat() {
+        // 0.4° in facets of 7 µm height: every facet would pass, the whole does not.
+        assert!(found(&ramp(100, |_| 0.007)).is_empty());
+        // The same slope in two facets leaves the slab at once.
+        let turned = shapes::cube(20.0).transformed(&Isometry3::rotation(Vector3::x() * 0.007));
+        assert!(found(&turned).is_empty());
+        assert_eq!(found(&ramp(100, |i| if i < 20 { 0.007 } else { 0.0 })).len(), 1);
+    }
+
+    #[test]
+    fn noise_does_not_split_a_face() {
+        let rough = ramp(200, |i| [0.006, -0.009, 0.004, -0.001][i % 4]);
+        let flats = flats(&rough, &USUAL);
+        assert_eq!(flats.len(), 1, "{flats:?}");
+        assert!((flats[0].area_mm2 - 200.0).abs() < 0.1);
+        assert!((flats[0].z_mm - 1.0).abs() < 0.005);
+    }
+
+    #[test]
+    fn the_order_of_the_facets_does_not_matter() {
+        let mesh = ramp(200, |i| [0.006, -0.009, 0.004, -0.001][i % 4]);
+        let mut shuffled = mesh.clone();
+        shuffled.triangles.rotate_left(77);
+        shuffled.triangles.reverse();
+        assert_eq!(flats(&mesh, &USUAL), flats(&shuffled, &USUAL));
+    }
+}

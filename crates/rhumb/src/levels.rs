@@ -1,0 +1,274 @@
+//! The layers of a part: its flat faces, the schedule that meets them, and what is said of those
+//! that it misses.
+
+use std::fmt::Write as _;
+
+use machine::gcode::decimal;
+use mesh::flats::{Facing, Flat, flats};
+use mesh::mesh::Mesh;
+use slicer::level::{Extent, FlatFace, Level, Snap, adaptive, cost, misses, schedule};
+use slicer::surface::LayerSurface;
+
+use crate::failure::Failure;
+use crate::report::{self, Warning};
+use crate::settings::Job;
+
+/// More layers than any printer lays: a setting or a unit is wrong.
+const MOST_LAYERS: f64 = 100_000.0;
+
+/// More than this is a minute of work for the schedule: a very fine increment on a tall part.
+const MOST_STEPS: f64 = 2e8;
+
+/// A flat face and how far the nearest layer misses it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MetFlat {
+    /// The face.
+    pub flat: Flat,
+    /// Distance of the nearest bound of a layer, mm.
+    pub miss: f64,
+    /// Whether the schedule was asked to meet it.
+    pub wanted: bool,
+}
+
+/// The layers, and what became of the flat faces.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Layout {
+    /// The layers.
+    pub levels: Vec<Level>,
+    /// The flat faces, from the bed up.
+    pub flats: Vec<MetFlat>,
+    /// What is still a hit, mm: half an increment, and the rounding of a level.
+    pub tolerance: f64,
+}
+
+/// Lays out the layers of a part that stands on the bed.
+///
+/// # Errors
+///
+/// `LimitExceeded`.
+pub fn layout(part: &Mesh, surface: &dyn LayerSurface, job: &Job) -> Result<Layout, Failure> {
+    let params = &job.schedule;
+    let top = part.bounds().max.z;
+    check_cost(top, job)?;
+    let flats = flats(part, &job.flats);
+    let face = |flat: &Flat| FlatFace { level: flat.z_mm, area: flat.area_mm2 };
+    let is_wanted = |flat: &&Flat| flat.area_mm2 >= job.least_flat_mm2;
+    let wanted: Vec<FlatFace> = flats.iter().filter(is_wanted).map(face).collect();
+    let caps = params
+        .adaptive
+        .map(|adaptive| adaptive::caps(part, surface, top, params, &adaptive))
+        .unwrap_or_default();
+    let levels = schedule(&Extent { top, flats: &wanted, caps: &caps }, params);
+    let all: Vec<FlatFace> = flats.iter().map(face).collect();
+    let flats = flats
+        .iter()
+        .zip(misses(&levels, &all))
+        .map(|(flat, miss)| MetFlat { flat: *flat, miss, wanted: is_wanted(&flat) })
+        .collect();
+    const ROUNDING_MM: f64 = 1e-6;
+    Ok(Layout { levels, flats, tolerance: params.increment / 2.0 + ROUNDING_MM })
+}
+
+fn check_cost(top: f64, job: &Job) -> Result<(), Failure> {
+    let cost = cost(top, &job.schedule);
+    if cost.layers > MOST_LAYERS {
+        return Err(Failure::new(
+            "LimitExceeded",
+            format!("{:.0} layers are too many; the limit is {MOST_LAYERS}", cost.layers),
+        ));
+    }
+    if cost.steps > MOST_STEPS {
+        return Err(Failure::new(
+            "LimitExceeded",
+            format!(
+                "z_increment_mm = {} is too fine for a part of {top:.1} mm: the schedule would \
+                 weigh up {:.1e} choices; the limit is {MOST_STEPS:.0e}",
+                job.schedule.increment, cost.steps
+            ),
+        )
+        .hint("set a coarser z_increment_mm, or snap = off"));
+    }
+    Ok(())
+}
+
+impl Layout {
+    /// The flat faces that were wanted and are missed.
+    pub fn missed(&self) -> impl Iterator<Item = &MetFlat> {
+        self.flats.iter().filter(|met| met.wanted && met.miss > self.tolerance)
+    }
+
+    /// The flat faces that are missed because they are too small to matter.
+    pub fn ignored(&self) -> impl Iterator<Item = &MetFlat> {
+        self.flats.iter().filter(|met| !met.wanted && met.miss > self.tolerance)
+    }
+
+    /// What the user should know. Whoever turned snapping off knows that faces are missed.
+    #[must_use]
+    pub fn warnings(&self, snap: Snap) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        if snap == Snap::Off {
+            return warnings;
+        }
+        let missed: Vec<&MetFlat> = self.missed().collect();
+        if !missed.is_empty() {
+            let message =
+                format!("{} missed by the layers: {}", faces(missed.len()), list(&missed));
+            warnings.push(Warning { code: "FlatMissed".into(), message });
+        }
+        let ignored: Vec<&MetFlat> = self.ignored().collect();
+        if !ignored.is_empty() {
+            let message = format!(
+                "{} smaller than flat_area_min_mm2 and not met: {}",
+                faces(ignored.len()),
+                list(&ignored)
+            );
+            warnings.push(Warning { code: "FlatsIgnored".into(), message });
+        }
+        warnings
+    }
+
+    /// The flat faces as the report shows them.
+    #[must_use]
+    pub fn report(&self) -> Vec<report::Flat> {
+        let facing = |facing| match facing {
+            Facing::Up => "up",
+            Facing::Down => "down",
+        };
+        self.flats
+            .iter()
+            .map(|met| report::Flat {
+                z_mm: tidy(met.flat.z_mm),
+                area_mm2: tidy(met.flat.area_mm2),
+                error_mm: met.miss,
+                facing: facing(met.flat.facing),
+                ignored: !met.wanted,
+            })
+            .collect()
+    }
+
+    /// One line for people; `None` when there is nothing to say.
+    #[must_use]
+    pub fn summary(&self) -> Option<String> {
+        let wanted = self.flats.iter().filter(|met| met.wanted).count();
+        let missed = self.missed().count();
+        match (wanted, missed) {
+            (0, _) => None,
+            (1, 0) => Some("the only one is met".into()),
+            (_, 0) => Some(format!("all {wanted} are met")),
+            _ => Some(format!("{} of {wanted} are met", wanted - missed)),
+        }
+    }
+}
+
+fn faces(count: usize) -> String {
+    if count == 1 { "1 flat face is".into() } else { format!("{count} flat faces are") }
+}
+
+/// The largest few, in the order of their heights.
+fn list(flats: &[&MetFlat]) -> String {
+    const MOST: usize = 5;
+    let mut largest = flats.to_vec();
+    largest.sort_by(|a, b| b.flat.area_mm2.total_cmp(&a.flat.area_mm2));
+    largest.truncate(MOST);
+    largest.sort_by(|a, b| a.flat.z_mm.total_cmp(&b.flat.z_mm));
+    let mut text = String::new();
+    for (i, met) in largest.iter().enumerate() {
+        // Writing to a string cannot fail.
+        let _ = write!(
+            text,
+            "{}z = {} mm ({} mm²) by {} mm",
+            if i == 0 { "" } else { ", " },
+            decimal(met.flat.z_mm, 3),
+            decimal(met.flat.area_mm2, 2),
+            decimal(met.miss, 3)
+        );
+    }
+    if flats.len() > MOST {
+        let _ = write!(text, ", and {} smaller ones", flats.len() - MOST);
+    }
+    text
+}
+
+/// A number without the noise of its last bits.
+fn tidy(number: f64) -> f64 {
+    (number * 1e6).round() / 1e6
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+    use mesh::shapes;
+    use slicer::surface::Plane;
+
+    fn job(set: &[&str]) -> Job {
+        let mut settings = Settings::defaults();
+        for pair in set {
+            settings.set(pair).unwrap();
+        }
+        Job::resolve(&settings).unwrap()
+    }
+
+    /// Two blocks side by side, of different heights.
+    fn two(low: f64, high: f64) -> Mesh {
+        let outline = [[0.0, 0.0], [10.0, 0.0], [10.0, high], [5.0, high], [5.0, low], [0.0, low]];
+        let mut mesh = shapes::extruded(&outline, &[], 10.0);
+        for p in &mut mesh.vertices {
+            *p = nalgebra::Point3::new(p.x, -p.z, p.y);
+        }
+        mesh
+    }
+
+    #[test]
+    fn flats_are_met_to_half_an_increment() {
+        let layout = layout(&shapes::steps(), &Plane, &job(&[])).unwrap();
+        assert_eq!(layout.flats.len(), 5);
+        assert!(layout.flats.iter().all(|met| met.miss == 0.0), "{layout:?}");
+        assert!(layout.warnings(Snap::Optimal).is_empty());
+        assert_eq!(layout.summary().unwrap(), "all 5 are met");
+    }
+
+    #[test]
+    fn a_missed_flat_is_told() {
+        let job = job(&[]);
+        let layout = layout(&two(5.0, 5.02), &Plane, &job).unwrap();
+        let warnings = layout.warnings(Snap::Optimal);
+        assert_eq!(warnings.len(), 1);
+        assert_eq!(warnings[0].code, "FlatMissed");
+        assert!(warnings[0].message.contains("(50 mm²) by 0.02 mm"), "{}", warnings[0].message);
+        assert_eq!(layout.missed().count(), 1);
+        assert!(layout.warnings(Snap::Off).is_empty());
+    }
+
+    #[test]
+    fn a_small_flat_is_ignored_and_told() {
+        let job = job(&["flat_area_min_mm2=60"]);
+        let layout = layout(&two(5.07, 8.0), &Plane, &job).unwrap();
+        assert_eq!(layout.missed().count(), 0);
+        assert_eq!(layout.ignored().count(), 1);
+        assert_eq!(layout.warnings(Snap::Optimal)[0].code, "FlatsIgnored");
+        assert!(layout.report()[1].ignored);
+    }
+
+    #[test]
+    fn absurd_schedules_are_refused() {
+        let refused = |set: &[&str], height: f64| {
+            layout(&shapes::block(1.0, 1.0, height), &Plane, &job(set)).unwrap_err().class()
+        };
+        let fine = ["z_increment_mm=0.001", "max_layer_height_mm=0.44"];
+        assert_eq!(refused(&fine, 2000.0), "LimitExceeded");
+        let thin = ["layer_height_mm=0.01", "min_layer_height_mm=0.01", "snap=off"];
+        assert_eq!(refused(&thin, 2000.0), "LimitExceeded");
+    }
+
+    #[test]
+    fn adaptive_layers_meet_flats_too() {
+        let job = job(&["adaptive=true", "cusp_mm=0.08"]);
+        let mushroom = shapes::mushroom(96);
+        let layout = layout(&mushroom, &Plane, &job).unwrap();
+        assert_eq!(layout.missed().count(), 0);
+        let thickness = layout.levels.iter().map(Level::thickness);
+        let (thin, thick) = thickness.fold((f64::MAX, 0.0_f64), |(a, b), h| (a.min(h), b.max(h)));
+        assert!(thin < 0.15 && thick > 0.25, "{thin} {thick}");
+    }
+}
