@@ -165,11 +165,37 @@ impl Units {
     }
 }
 
-/// The layer surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum LayerKind {
-    /// Horizontal planes.
-    Planar,
+/// The surface that layers follow. A shorter way to write settings.
+#[derive(Debug, Clone, Default, Args)]
+pub struct LayerArguments {
+    /// The surface that layers follow: planar, conical, spherical or caps
+    #[arg(long, value_name = "KIND")]
+    pub layers: Option<String>,
+    /// Slope of conical layers; positive when they fall outwards, negative for bowls
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    pub cone_angle: Option<String>,
+    /// Height of the centre of spherical layers, mm, at or below the bed
+    #[arg(long, value_name = "Z", allow_hyphen_values = true)]
+    pub sphere_centre: Option<String>,
+    /// Radius of the sphere whose cap is lifted from layer to layer, mm
+    #[arg(long, value_name = "R")]
+    pub cap_radius: Option<String>,
+}
+
+impl LayerArguments {
+    /// Returns them as settings.
+    #[must_use]
+    pub fn set(&self) -> Vec<String> {
+        [
+            ("layers", &self.layers),
+            ("cone_angle_deg", &self.cone_angle),
+            ("sphere_centre_mm", &self.sphere_centre),
+            ("cap_radius_mm", &self.cap_radius),
+        ]
+        .into_iter()
+        .filter_map(|(key, value)| value.as_ref().map(|value| format!("{key}={value}")))
+        .collect()
+    }
 }
 
 /// Arguments of `slice`.
@@ -181,8 +207,8 @@ pub struct Slice {
     #[arg(short, long, value_name = "OUT.gcode")]
     pub output: Option<PathBuf>,
     /// The surface that layers follow
-    #[arg(long, value_enum, default_value_t = LayerKind::Planar)]
-    pub layers: LayerKind,
+    #[command(flatten)]
+    pub layers: LayerArguments,
     /// How the model is placed
     #[command(flatten)]
     pub place: PlaceArguments,

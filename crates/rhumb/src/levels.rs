@@ -69,14 +69,24 @@ pub fn layout(part: &Mesh, surface: &dyn LayerSurface, job: &Job) -> Result<Layo
     Ok(Layout { levels, flats, tolerance: params.increment / 2.0 + ROUNDING_MM })
 }
 
-fn check_cost(top: f64, job: &Job) -> Result<(), Failure> {
-    let cost = cost(top, &job.schedule);
-    if cost.layers > MOST_LAYERS {
+/// Refuses a number of layers that no printer lays.
+///
+/// # Errors
+///
+/// `LimitExceeded`.
+pub(crate) fn check_count(layers: f64) -> Result<(), Failure> {
+    if layers > MOST_LAYERS {
         return Err(Failure::new(
             "LimitExceeded",
-            format!("{:.0} layers are too many; the limit is {MOST_LAYERS}", cost.layers),
+            format!("{layers:.0} layers are too many; the limit is {MOST_LAYERS}"),
         ));
     }
+    Ok(())
+}
+
+fn check_cost(top: f64, job: &Job) -> Result<(), Failure> {
+    let cost = cost(top, &job.schedule);
+    check_count(cost.layers)?;
     if cost.steps > MOST_STEPS {
         return Err(Failure::new(
             "LimitExceeded",

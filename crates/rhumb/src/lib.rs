@@ -46,5 +46,7 @@ pub mod program_text;
 pub mod progress;
 pub mod report;
 pub mod settings;
+mod stack;
+pub mod stages;
 pub mod stopwatch;
 pub mod summary;

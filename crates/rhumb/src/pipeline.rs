@@ -4,11 +4,9 @@
 //! its text in order. Text leaves as soon as a window is planned, so memory holds the mesh and a
 //! window, and the bytes are the same for any number of threads.
 
-use std::collections::VecDeque;
 use std::io::Write;
 use std::path::Path;
 
-use geom::region::Region;
 use machine::gcode::Emitter;
 use machine::program::Step;
 use mesh::health::{Health, solid_from_soup};
@@ -18,24 +16,22 @@ use mesh::stl;
 use mesh::topology::Solid;
 use nalgebra::Rotation3;
 use plan::planner::{Planner, Totals};
-use rayon::prelude::*;
-use slicer::layer::{Filled, fill_layer};
+use slicer::layer::Filled;
 use slicer::level::Level;
-use slicer::lift::Lift;
-use slicer::section::{Cutter, Section, Tears};
-use slicer::skins::{Neighbours, SKIN_TOLERANCE_MM};
-use slicer::surface::Plane;
+use slicer::section::Tears;
 use slicer::toolpath::LostArea;
 
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
-use crate::levels::{Layout, layout};
+use crate::levels::Layout;
 use crate::output;
 use crate::place::{Fit, Placed, Wish, check_envelope, place, suspect_units};
 use crate::program_text;
 use crate::progress::Progress;
 use crate::report::{Timings, Warning};
 use crate::settings::{Job, Settings};
+use crate::stack::Stack;
+use crate::stages::{Stage, stages};
 use crate::stopwatch::Stopwatch;
 
 /// What to slice and how.
@@ -109,7 +105,7 @@ pub fn slice(
     drop(solid);
     let orient_ms = clock.lap();
 
-    let layout = layout(placed.solid.mesh(), &Plane, job)?;
+    let (stages, mut layout) = stages(placed.solid.mesh(), job)?;
     warnings.extend(layout.warnings(job.schedule.snap));
     let schedule_ms = clock.lap();
     // The slicer works in a frame that turns with the part, so that its choices do too.
@@ -119,7 +115,8 @@ pub fn slice(
     job.plan.resample.azimuth = placed.azimuth;
     let mut text = Emitter::new(out, job.dialect);
     program_text::head(&mut text, request.name, request.made_at, &job.start).map_err(written)?;
-    let printed = layers(&upright, &layout.levels, &job, &mut text, watch)?;
+    let mut printed = layers(&upright, &stages, &job, &mut text, watch)?;
+    layout.levels = std::mem::take(&mut printed.levels);
     program_text::tail(
         &mut text,
         &job.end,
@@ -203,32 +200,46 @@ struct Printed {
     torn_layers: usize,
     floating: Option<(usize, f64)>,
     adhesion_out_of_reach: usize,
+    /// The layers that were printed.
+    levels: Vec<Level>,
 }
 
 fn layers(
     solid: &Solid,
-    levels: &[Level],
+    stages: &[Stage],
     job: &Job,
     text: &mut Emitter<&mut dyn Write>,
     watch: &mut Watch<'_>,
 ) -> Result<Printed, Failure> {
     let mut printed = Printed::default();
-    let mut stack = Stack::new(solid, levels, job);
     let mut planner = Planner::new(&job.printer, job.plan);
-    watch.progress.stage("slice", levels.len() as u64);
-    for start in (0..levels.len()).step_by(WINDOW) {
-        watch.interrupt.check()?;
-        let window = start..(start + WINDOW).min(levels.len());
-        stack.reach(&window, &mut printed);
-        let filled = stack.fill(window.clone());
-        for (index, filled) in window.zip(filled) {
-            printed.count(index, &filled, &levels[index]);
-            let steps = planner.layer(&filled.paths).map_err(|error| {
-                Failure::new("OutOfEnvelope", error.to_string())
-                    .hint("move the part off the axis with --place, or correct the calibration")
-            })?;
-            write(text, &steps)?;
-            watch.progress.advance(1);
+    let count: usize = stages.iter().map(|stage| stage.printed.len()).sum();
+    watch.progress.stage("slice", count as u64);
+    for stage in stages {
+        if stages.len() > 1 {
+            let surface = format!("{SURFACE_REMARK}{}", stage.kind.describe());
+            write(text, &[Step::Remark(surface)])?;
+        }
+        let mut stack = Stack::new(solid, stage, job);
+        for start in stage.printed.clone().step_by(WINDOW) {
+            watch.interrupt.check()?;
+            let window = start..(start + WINDOW).min(stage.printed.end);
+            stack.reach(&window, |tears| printed.count_tears(tears));
+            let filled = stack.fill(window.clone());
+            for (k, mut filled) in window.zip(filled) {
+                watch.progress.advance(1);
+                // Layers of one stage may pass beside the part, above or below it.
+                if filled.paths.is_empty() && stages.len() > 1 {
+                    continue;
+                }
+                filled.paths.index = printed.levels.len();
+                printed.count(&filled, &stage.levels[k]);
+                let steps = planner.layer(&filled.paths).map_err(|error| {
+                    Failure::new("OutOfEnvelope", error.to_string())
+                        .hint("move the part off the axis with --place, or correct the calibration")
+                })?;
+                write(text, &steps)?;
+            }
         }
     }
     let (steps, totals) =
@@ -236,82 +247,27 @@ fn layers(
     write(text, &steps)?;
     printed.totals = totals;
     if printed.totals.extruded() <= 0.0 {
-        return Err(Failure::new(
-            "NothingToPrint",
-            format!(
-                "no bead fits in any of the {} layers; the part is thinner than {} mm everywhere",
-                levels.len(),
-                job.paths.thin.least_width
-            ),
-        )
-        .hint("check the units of the file (--units), or print with a finer nozzle"));
+        return Err(nothing_to_print(count, job));
     }
     Ok(printed)
 }
 
+/// How a program says which surface the following layers lie on.
+pub const SURFACE_REMARK: &str = "layer surface = ";
+
+fn nothing_to_print(layers: usize, job: &Job) -> Failure {
+    Failure::new(
+        "NothingToPrint",
+        format!(
+            "no bead fits in any of the {layers} layers; the part is thinner than {} mm everywhere",
+            job.paths.thin.least_width
+        ),
+    )
+    .hint("check the units of the file (--units), or print with a finer nozzle")
+}
+
 fn write(text: &mut Emitter<&mut dyn Write>, steps: &[Step]) -> Result<(), Failure> {
     steps.iter().try_for_each(|step| text.step(step)).map_err(written)
-}
-
-/// The sections that a window needs: its own, and those above and below that decide on its skins.
-struct Stack<'a> {
-    cutter: Cutter<'a>,
-    levels: &'a [Level],
-    job: &'a Job,
-    /// Sections from `first` on, each with a thinned-out copy for comparing layers.
-    sections: VecDeque<(Section, Region)>,
-    first: usize,
-}
-
-impl<'a> Stack<'a> {
-    fn new(solid: &'a Solid, levels: &'a [Level], job: &'a Job) -> Self {
-        let cutter = Cutter::new(solid, &Plane, levels);
-        Self { cutter, levels, job, sections: VecDeque::new(), first: 0 }
-    }
-
-    /// Cuts what is missing for a window and drops what no later window needs.
-    fn reach(&mut self, window: &std::ops::Range<usize>, printed: &mut Printed) {
-        let skins = &self.job.paths.skins;
-        let keep_from = window.start.saturating_sub(skins.bottom_layers.max(1));
-        while self.first < keep_from {
-            self.sections.pop_front();
-            self.first += 1;
-        }
-        let have = self.first + self.sections.len();
-        let want = (window.end + skins.top_layers.max(1)).min(self.levels.len());
-        let cut: Vec<(Section, Region)> = (have..want)
-            .into_par_iter()
-            .map(|k| {
-                let section = self.cutter.section(k, self.job.paths.tolerance);
-                let cover = section.region.thinned(SKIN_TOLERANCE_MM);
-                (section, cover)
-            })
-            .collect();
-        for (section, _) in &cut {
-            printed.count_tears(&section.tears);
-        }
-        self.sections.extend(cut);
-    }
-
-    fn fill(&self, window: std::ops::Range<usize>) -> Vec<Filled> {
-        window
-            .into_par_iter()
-            .map(|k| {
-                let (section, _) = &self.sections[k - self.first];
-                let cover = |i: usize| self.sections.get(i.checked_sub(self.first)?).map(|s| &s.1);
-                let skins = &self.job.paths.skins;
-                let neighbours = Neighbours {
-                    above: (k + 1..=k + skins.top_layers.max(1)).map_while(cover).collect(),
-                    below: (k.saturating_sub(skins.bottom_layers.max(1))..k)
-                        .rev()
-                        .map_while(cover)
-                        .collect(),
-                };
-                let lift = Lift { surface: &Plane, level: self.levels[k], floor: None };
-                fill_layer(&lift, &section.region, &neighbours, &self.job.paths)
-            })
-            .collect()
-    }
 }
 
 impl Printed {
@@ -323,7 +279,9 @@ impl Printed {
         self.tears.dropped_length += tears.dropped_length;
     }
 
-    fn count(&mut self, index: usize, filled: &Filled, level: &Level) {
+    fn count(&mut self, filled: &Filled, level: &Level) {
+        let index = self.levels.len();
+        self.levels.push(Level { index, ..*level });
         let lost = &filled.paths.lost;
         self.lost.area += lost.area;
         self.lost_volume += lost.area * level.thickness();

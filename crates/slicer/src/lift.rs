@@ -10,6 +10,8 @@
 //! thickness; below that nothing is laid, and the next layer takes over what is left. That balances
 //! volume exactly and no layer need know of another.
 
+use geom::grid::{GridPoint, mm};
+use geom::region::{Fill, Region};
 use nalgebra::{Point2, Point3, center};
 
 use crate::bead::Bead;
@@ -68,6 +70,22 @@ impl Lift<'_> {
             tau
         } else {
             full
+        }
+    }
+
+    /// Returns the part of a region of the chart where the layer is thick enough to be laid.
+    #[must_use]
+    pub fn above_floor(&self, region: &Region) -> Region {
+        let (Some(_), Some(bounds)) = (self.floor, region.bounds()) else { return region.clone() };
+        let corner = |p: GridPoint| mm(p).coords.abs();
+        let reach = corner(bounds.min).sup(&corner(bounds.max)).norm();
+        let is_laid = |s: f64| self.thickness(&self.point(&Point2::new(s, 0.0))) > 0.0;
+        match (is_laid(0.0), is_laid(reach)) {
+            (true, true) => region.clone(),
+            (false, false) => Region::default(),
+            // Layers fall outwards, or rise: on the meridian the floor is met once.
+            (true, false) => region.intersection(&disc(border(0.0, reach, is_laid))),
+            (false, true) => region.difference(&disc(border(reach, 0.0, is_laid))),
         }
     }
 
@@ -135,6 +153,33 @@ impl Lift<'_> {
         stations.push(middle);
         self.halve([half, line[1]], [middle, *b], bead, stations);
     }
+}
+
+/// The place between `inside`, where `holds` does, and `outside`, where it does not, at which that
+/// changes.
+fn border(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    // A millimetre halved 40 times is far below a grid step.
+    for _ in 0..40 {
+        let middle = f64::midpoint(inside, outside);
+        if holds(middle) {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    inside
+}
+
+/// A disc about the axis, to within [`CHORD_MM`].
+fn disc(radius: f64) -> Region {
+    let step = 2.0 * (1.0 - (CHORD_MM / radius).min(0.5)).acos();
+    let count = (std::f64::consts::TAU / step).ceil();
+    let point = |k: u32| {
+        let angle = std::f64::consts::TAU * f64::from(k) / count;
+        Point2::new(radius * angle.cos(), radius * angle.sin())
+    };
+    let ring: Vec<Point2<f64>> = (0..count as u32).map(point).collect();
+    Region::from_rings([ring.as_slice()], Fill::NonZero)
 }
 
 #[cfg(test)]

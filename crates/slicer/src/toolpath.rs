@@ -101,6 +101,17 @@ pub struct LayerPaths {
     pub lost: LostArea,
 }
 
+impl LayerPaths {
+    /// Returns whether nothing is laid.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        let is_empty = |island: &IslandPaths| {
+            island.fills.is_empty() && island.walls.iter().all(|group| group.loops.is_empty())
+        };
+        self.adhesion.is_empty() && self.islands.iter().all(is_empty)
+    }
+}
+
 /// Area of a layer that no bead fits in.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LostArea {

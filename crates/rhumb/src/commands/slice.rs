@@ -24,7 +24,9 @@ use crate::summary;
 pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     let interrupt = Interrupt::on_signals();
     let mut total = Stopwatch::start();
-    let (settings, job) = settings(&arguments.settings)?;
+    let mut wanted = arguments.settings.clone();
+    wanted.set.extend(arguments.layers.set());
+    let (settings, job) = settings(&wanted)?;
     let wish = wish(&arguments.place)?;
     let target = target(arguments);
     let model = input::read(&arguments.model)?;

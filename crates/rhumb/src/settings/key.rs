@@ -501,6 +501,35 @@ pub const KEYS: &[Key] = &[
         (10.0, 0.1, 200.0),
         "but never below this speed",
     ),
+    choice(
+        Print,
+        "layers",
+        &["planar", "conical", "spherical", "caps"],
+        "the surface that layers follow: planes, cones about the axis, spheres about a point of it, \
+         or the same cap of a sphere lifted",
+    ),
+    number(
+        Print,
+        "cone_angle_deg",
+        "cone_angle",
+        (30.0, -75.0, 75.0),
+        "slope of conical layers; positive when they fall outwards, negative for bowls",
+    ),
+    number(
+        Print,
+        "sphere_centre_mm",
+        "sphere_centre",
+        (-60.0, -1e5, 0.0),
+        "height of the centre of spherical layers",
+    ),
+    number(
+        Print,
+        "cap_radius_mm",
+        "cap_radius",
+        (100.0, 1.0, 1e5),
+        "radius of the sphere whose cap is lifted",
+    ),
+    count(Print, "base_layers", (2, 0, 1000), "planar layers under curved ones"),
     number(Print, "layer_height_mm", "layer_height", (0.2, 0.01, 2.0), "thickness of a layer"),
     number(
         Print,

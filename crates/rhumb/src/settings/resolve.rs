@@ -26,6 +26,7 @@ use super::key::{Key, Value};
 use super::merge::Settings;
 use super::template;
 use crate::failure::Failure;
+use crate::stages::LayerKind;
 
 /// Everything that a slice needs to know, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +41,10 @@ pub struct Job {
     pub flats: FlatParams,
     /// Flat faces smaller than this need not be met, mm².
     pub least_flat_mm2: f64,
+    /// The surface that layers follow.
+    pub layers: LayerKind,
+    /// Planar layers under curved ones.
+    pub base_layers: usize,
     /// Where layers lie.
     pub schedule: ScheduleParams,
     /// How layers are filled.
@@ -79,6 +84,8 @@ impl Job {
                 depth_mm: get.number("flat_depth_mm"),
             },
             least_flat_mm2: get.number("flat_area_min_mm2"),
+            layers: layers(&get),
+            base_layers: get.count("base_layers"),
             schedule: schedule(&get)?,
             paths: paths(&get, &printer, &tolerances),
             plan: plan(&get, dialect, &tolerances),
@@ -88,6 +95,15 @@ impl Job {
             printer,
             dialect,
         })
+    }
+}
+
+fn layers(get: &Lookup<'_>) -> LayerKind {
+    match get.text("layers") {
+        "conical" => LayerKind::Conical(get.number("cone_angle_deg").to_radians()),
+        "spherical" => LayerKind::Spherical(get.number("sphere_centre_mm")),
+        "caps" => LayerKind::Caps(get.number("cap_radius_mm")),
+        _ => LayerKind::Planar,
     }
 }
 
@@ -300,6 +316,7 @@ fn pattern(word: &str) -> Pattern {
 }
 
 fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanParams {
+    let curved = layers(get) != LayerKind::Planar;
     let diameter = get.number("filament_diameter_mm");
     PlanParams {
         order: OrderParams {
@@ -308,7 +325,7 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
                 _ => SeamPosition::Aligned,
             },
             external_first: get.switch("external_perimeters_first"),
-            uphill: false,
+            uphill: curved,
         },
         speeds: Speeds {
             external_perimeter: get.number("external_perimeter_speed_mm_per_s"),
@@ -346,7 +363,7 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
             fan: get.number("fan_speed"),
             layers_without_fan: get.count("disable_fan_first_layers"),
         },
-        curved: false,
+        curved,
     }
 }
 

@@ -1,0 +1,163 @@
+//! The stages of a print: families of layers, one on top of the other.
+//!
+//! A planar print has one. A curved one begins with some planar layers on the bed
+//! (`base_layers`), whose upper side is the floor that the curved layers begin on.
+//!
+//! A stage knows more levels than it prints: what lies beyond is cut all the same, because it
+//! decides where the printed ones are bottoms and tops. The base is part of the same solid, so its
+//! layers and the curved ones need not know of each other.
+
+use std::ops::Range;
+
+use mesh::mesh::Mesh;
+use nalgebra::Point3;
+use slicer::level::Level;
+use slicer::surface::{Caps, Cone, Extent, LayerSurface, Plane, Spheres, SurfaceError};
+
+use crate::failure::Failure;
+use crate::levels::{self, Layout};
+use crate::settings::Job;
+
+/// The surface that layers follow, as the user names it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LayerKind {
+    /// Horizontal planes.
+    Planar,
+    /// Cones about the axis; radians, positive for layers that slope down outwards.
+    Conical(f64),
+    /// Spheres about a point of the axis at this height, mm.
+    Spherical(f64),
+    /// Caps of a sphere of this radius (mm), one like the other.
+    Caps(f64),
+}
+
+impl LayerKind {
+    /// Returns the word that users write.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Planar => "planar",
+            Self::Conical(_) => "conical",
+            Self::Spherical(_) => "spherical",
+            Self::Caps(_) => "caps",
+        }
+    }
+
+    /// Says what it is, for people and for whoever reads the program.
+    #[must_use]
+    pub fn describe(self) -> String {
+        let number = |value: f64| machine::gcode::decimal(value, 3);
+        match self {
+            Self::Planar => "planar".into(),
+            Self::Conical(angle) => format!("conical, angle {}", number(angle.to_degrees())),
+            Self::Spherical(centre_z) => format!("spherical, centre {}", number(centre_z)),
+            Self::Caps(radius) => format!("caps, radius {}", number(radius)),
+        }
+    }
+
+    fn surface(self) -> Result<Box<dyn LayerSurface>, SurfaceError> {
+        Ok(match self {
+            Self::Planar => Box::new(Plane),
+            Self::Conical(angle) => Box::new(Cone::new(angle)?),
+            Self::Spherical(centre_z) => Box::new(Spheres::new(centre_z)?),
+            Self::Caps(radius) => Box::new(Caps::new(radius)?),
+        })
+    }
+}
+
+/// Layers of one family. See the [module](self).
+pub struct Stage {
+    /// The family.
+    pub surface: Box<dyn LayerSurface>,
+    /// What it is.
+    pub kind: LayerKind,
+    /// All levels that are cut.
+    pub levels: Vec<Level>,
+    /// Which of them are printed.
+    pub printed: Range<usize>,
+    /// The flat floor that the printed ones begin on, mm; `None` where they begin on the bed and
+    /// are flat themselves.
+    pub floor: Option<f64>,
+}
+
+/// Lays out the stages of a part that stands on the bed, and says which flat faces they meet.
+///
+/// # Errors
+///
+/// `LimitExceeded`, or `OutOfEnvelope` for a surface that does not fit the part.
+pub fn stages(part: &Mesh, job: &Job) -> Result<(Vec<Stage>, Layout), Failure> {
+    let layout = levels::layout(part, &Plane, job)?;
+    if job.layers == LayerKind::Planar {
+        let levels = layout.levels.clone();
+        let planar = Stage {
+            surface: Box::new(Plane),
+            kind: LayerKind::Planar,
+            printed: 0..levels.len(),
+            levels,
+            floor: None,
+        };
+        return Ok((vec![planar], layout));
+    }
+    let surface = job.layers.surface().map_err(|error| unfit(&error))?;
+    surface.fits(&extent(part)).map_err(|error| unfit(&error))?;
+    let base = base(job);
+    let floor = base.printed.end.checked_sub(1).map_or(0.0, |last| base.levels[last].upper);
+    let curved = curved(part, surface, floor, job)?;
+    Ok((vec![base, curved], Layout { flats: Vec::new(), ..layout }))
+}
+
+fn unfit(error: &SurfaceError) -> Failure {
+    Failure::new("OutOfEnvelope", error.to_string())
+}
+
+fn extent(part: &Mesh) -> Extent {
+    let radius = part.vertices.iter().map(|p| p.x.hypot(p.y)).fold(0.0, f64::max);
+    Extent { lowest: part.bounds().min.z, radius }
+}
+
+/// The planar layers under the curved ones.
+fn base(job: &Job) -> Stage {
+    let params = &job.schedule;
+    let bound = |i: usize| match i.checked_sub(1) {
+        None => 0.0,
+        Some(above_first) => params.first_layer_height + params.layer_height * above_first as f64,
+    };
+    let count = job.base_layers + job.paths.skins.top_layers.max(1);
+    let levels = (0..count)
+        .map(|index| Level { index, lower: bound(index), upper: bound(index + 1) })
+        .collect();
+    let kind = LayerKind::Planar;
+    Stage { surface: Box::new(Plane), kind, levels, printed: 0..job.base_layers, floor: None }
+}
+
+fn curved(
+    part: &Mesh,
+    surface: Box<dyn LayerSurface>,
+    floor: f64,
+    job: &Job,
+) -> Result<Stage, Failure> {
+    let Extent { radius, .. } = extent(part);
+    let top = part.bounds().max.z;
+    let level = |r: f64, z: f64| surface.level(&Point3::new(r, 0.0, z));
+    // The level grows or falls outwards all the way, so that its least value on the floor is at
+    // one end; its greatest in the part is at a vertex, or, of bowls, at most that of the top on
+    // the axis. Layers that turn out empty are left out later.
+    let least = level(0.0, floor).min(level(radius, floor));
+    let greatest = part.vertices.iter().map(|p| surface.level(p)).fold(level(0.0, top), f64::max);
+    let step = surface.level_step(job.schedule.layer_height);
+    let count = ((greatest - least) / step).ceil().max(1.0);
+    levels::check_count(count)?;
+    let skins = &job.paths.skins;
+    let below = skins.bottom_layers.max(1);
+    let printed = below..below + count as usize;
+    let bound = |k: usize| least + step * (k as f64 - below as f64);
+    let levels = (0..printed.end + skins.top_layers.max(1))
+        .map(|k| Level {
+            // Only printed layers are counted, after those of the base.
+            index: (job.base_layers + k).saturating_sub(below),
+            lower: bound(k),
+            upper: bound(k + 1),
+        })
+        .collect();
+    Ok(Stage { surface, kind: job.layers, levels, printed, floor: Some(floor) })
+}
