@@ -6,17 +6,21 @@
 //! In the order of the data: [`surface`] is the family of layers and [`chart`] the flat map of one,
 //! [`level`] says where they lie, [`section`] cuts the mesh, [`walls`], [`thin`], [`skins`] and
 //! [`infill`] fill an island, [`adhesion`] surrounds the first layer, [`layer`] puts it together
-//! into [`toolpath`]s of [`bead`]s.
+//! into [`toolpath`]s of [`bead`]s. [`stacking`] tells how thick beads are on a flat base,
+//! [`overhang`] what hangs in the air, [`clearance`] how steep layers may be.
 
 pub mod adhesion;
 pub mod bead;
 pub mod chart;
+pub mod clearance;
 pub mod infill;
 pub mod layer;
 pub mod level;
 pub mod lift;
+pub mod overhang;
 pub mod section;
 pub mod skins;
+pub mod stacking;
 pub mod surface;
 pub mod thin;
 pub mod toolpath;

@@ -3,12 +3,7 @@
 //! Lines are straight between the stations of a toolpath, and a straight line of a chart is not:
 //! it is halved until its pieces lie on the layer to within [`CHORD_MM`].
 //!
-//! **Wedges.** Curved layers that begin on a flat floor begin with nothing: between the floor and the
-//! layer's upper side lies a wedge. With `tau` the distance from the upper side along the normal
-//! down to the floor, a bead is as thick as the layer where `tau` is at least the layer's thickness
-//! and the least printable one; below that it takes all of `tau`, down to the least printable
-//! thickness; below that nothing is laid, and the next layer takes over what is left. That balances
-//! volume exactly and no layer need know of another.
+//! Where layers begin on a flat floor, beads are as thick as [`stacking`](crate::stacking) says.
 
 use geom::grid::{GridPoint, mm};
 use geom::region::{Fill, Region};
@@ -16,6 +11,7 @@ use nalgebra::{Point2, Point3, center};
 
 use crate::bead::Bead;
 use crate::level::Level;
+use crate::stacking::WedgeRule;
 use crate::surface::LayerSurface;
 use crate::toolpath::Station;
 
@@ -50,27 +46,14 @@ impl Lift<'_> {
         self.surface.lift(self.level.upper, uv)
     }
 
-    /// Returns the layer's full thickness at a point of its upper side, mm.
-    #[must_use]
-    pub fn full_thickness(&self, at: &Point3<f64>) -> f64 {
-        self.level.thickness() / self.surface.gradient(at).norm()
-    }
-
     /// Returns how thick a bead is at a point of the upper side, mm; zero where none is laid.
     #[must_use]
     pub fn thickness(&self, at: &Point3<f64>) -> f64 {
-        let full = self.full_thickness(at);
-        let Some(floor) = self.floor else { return full };
-        let least = LEAST_WEDGE_SHARE * full;
-        // The normal is straight and its slope is that of the layer all along.
-        let tau = (at.z - floor) / self.surface.normal(at).z;
-        if tau < least {
-            0.0
-        } else if tau < full + least {
-            tau
-        } else {
-            full
-        }
+        let step = self.level.thickness();
+        let full = step * self.surface.thickness_per_level(at);
+        let Some(base) = self.floor else { return full };
+        let rule = WedgeRule { base, least: LEAST_WEDGE_SHARE * full };
+        rule.thickness(self.surface, at, step)
     }
 
     /// Returns the part of a region of the chart where the layer is thick enough to be laid.

@@ -69,6 +69,11 @@ impl LayerSurface for Caps {
         Chart::Sphere { radius: self.radius }
     }
 
+    fn height(&self, level: f64, r: f64) -> f64 {
+        let Self { radius } = *self;
+        level - r * r / (radius + ((radius - r) * (radius + r)).sqrt())
+    }
+
     fn carry(&self, s: f64, from: f64, to: f64) -> f64 {
         // At the slope psi the step along the normal is (to − from)·cos psi; it leads that times
         // sin psi outwards, and the meridian grows by 1/cos psi faster than the radius.

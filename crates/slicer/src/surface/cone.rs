@@ -92,6 +92,18 @@ impl LayerSurface for Cone {
         thickness / self.cos
     }
 
+    fn slope_cos(&self, _: &Point3<f64>) -> f64 {
+        self.cos
+    }
+
+    fn thickness_per_level(&self, _: &Point3<f64>) -> f64 {
+        self.cos
+    }
+
+    fn height(&self, level: f64, r: f64) -> f64 {
+        level - self.slope * r
+    }
+
     fn carry(&self, s: f64, from: f64, to: f64) -> f64 {
         // A step h along the normal leads h·sin(angle) outwards, which the chart shows as
         // h·tan(angle); the step is the difference of the levels times cos(angle).

@@ -19,6 +19,11 @@ pub(crate) fn check(surface: &dyn LayerSurface, samples: &[Point3<f64>]) {
         form(surface, p);
         metric(surface, p);
         normals(surface, p);
+        let height = surface.height(surface.level(p), p.xy().coords.norm());
+        assert!((height - p.z).abs() < 1e-9, "{height} is not the height of {p}");
+        assert!((surface.slope_cos(p) - surface.normal(p).z).abs() < 1e-12);
+        let thickness = surface.thickness_per_level(p) * surface.gradient(p).norm();
+        assert!((thickness - 1.0).abs() < 1e-12);
         let on_axis = Point3::new(0.0, 0.0, p.z);
         assert!((surface.level(&on_axis) - p.z).abs() < 1e-9, "the level is z on the axis");
         assert_eq!(surface.flatten(&on_axis), Point2::origin());

@@ -59,6 +59,22 @@ pub trait LayerSurface: Send + Sync {
         self.gradient(p).normalize()
     }
 
+    /// Returns the cosine of the slope of the layer through `p`: the vertical part of its unit
+    /// normal. On the axis it is that of the places beside it.
+    fn slope_cos(&self, p: &Point3<f64>) -> f64 {
+        self.normal(p).z
+    }
+
+    /// Returns the thickness of the material at `p` per mm of level: the inverse length of the
+    /// gradient, and on the axis that of the places beside it.
+    fn thickness_per_level(&self, p: &Point3<f64>) -> f64 {
+        1.0 / self.gradient(p).norm()
+    }
+
+    /// Returns the height of layer `level` at distance `r` from the axis, mm; not a number where
+    /// the layer does not reach.
+    fn height(&self, level: f64, r: f64) -> f64;
+
     /// Returns how far levels lie apart, mm, whose layers are `thickness` (mm) thick along the
     /// normal; for [`Caps`], whose layers thin outwards, on the axis.
     fn level_step(&self, thickness: f64) -> f64 {

@@ -32,6 +32,10 @@ impl LayerSurface for Plane {
         Chart::Plane
     }
 
+    fn height(&self, level: f64, _: f64) -> f64 {
+        level
+    }
+
     fn carry(&self, s: f64, _: f64, _: f64) -> f64 {
         s
     }

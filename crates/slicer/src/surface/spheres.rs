@@ -65,6 +65,11 @@ impl LayerSurface for Spheres {
         Chart::Sphere { radius: self.radius(level) }
     }
 
+    fn height(&self, level: f64, r: f64) -> f64 {
+        let radius = self.radius(level);
+        level - r * r / (radius + ((radius - r) * (radius + r)).sqrt())
+    }
+
     fn carry(&self, s: f64, from: f64, to: f64) -> f64 {
         s * (self.radius(to) / self.radius(from))
     }
