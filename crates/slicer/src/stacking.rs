@@ -113,7 +113,7 @@ pub fn blend(
     [thinnest, thickest]: [f64; 2],
 ) -> Result<Vec<BlendLayer>, SurfaceError> {
     let is_sound = 0.0 < thinnest && thinnest < thickest && thickest.is_finite();
-    if !is_sound || !slope.is_finite() || !(radius.is_finite() && radius > 0.0) {
+    if !(is_sound && slope.is_finite() && radius.is_finite() && radius > 0.0) {
         return Err(SurfaceError::NotFinite);
     }
     let mut layers = Vec::new();

@@ -14,7 +14,6 @@
 
 use mesh::topology::Solid;
 use nalgebra::Point3;
-use rayon::prelude::*;
 
 use super::Cutter;
 use super::arc::Cut;
@@ -23,18 +22,16 @@ use crate::surface::Form;
 use geom::grid::snap;
 use geom::region::Ring;
 
-/// The least places of F on sides and in facets, where that is not at their ends.
-#[derive(Debug, Default)]
-pub(super) struct Lows {
-    /// F at the least place inside each side; infinite where there is none.
-    pub(super) sides: Vec<f64>,
-    /// Those inside facets, ascending by facet.
-    facets: Vec<FacetLow>,
+/// F on a solid, vertex by vertex.
+#[derive(Clone, Copy)]
+pub(super) struct Field<'a> {
+    pub(super) solid: &'a Solid,
+    pub(super) form: &'a Form,
+    pub(super) vertex_levels: &'a [f64],
 }
 
-#[derive(Debug, Clone, Copy)]
+/// The least place of F inside a facet.
 struct FacetLow {
-    facet: u32,
     at: Point3<f64>,
     value: f64,
 }
@@ -47,50 +44,50 @@ const RESIDUAL: f64 = 1e-10;
 /// Bisections from a whole side down to its last bit.
 const BISECTIONS: u32 = 60;
 
-impl Lows {
-    /// `values` are F at the vertices.
-    pub(super) fn new(solid: &Solid, form: &Form, vertex_levels: &[f64]) -> Self {
-        let vertices = &solid.mesh().vertices;
-        let value = |v: u32| form.value_of_level(vertex_levels[v as usize]);
-        let at = |v: u32| form.convex(&vertices[v as usize]);
-        let side_low = |side: u32| {
-            let [low, high] = solid.ends(side);
-            let (a, b) = (at(low), at(high));
-            let least = form.lowest_on_line(&a, &(b - a)).filter(|t| 0.0 < *t && *t < 1.0);
-            least
-                .map(|t| form.value(&a.lerp(&b, t)))
-                .filter(|least| *least < value(low).min(value(high)))
-                .unwrap_or(f64::INFINITY)
-        };
-        let facet_low = |facet: u32| {
-            let corners = solid.mesh().triangles[facet as usize].map(at);
-            let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-            let lowest = form.lowest_in_plane(&corners[0], &normal)?;
-            let is_inside = (0..3).all(|k| {
-                let side = corners[(k + 1) % 3] - corners[k];
-                side.cross(&(lowest - corners[k])).dot(&normal) > 0.0
-            });
-            is_inside.then(|| FacetLow { facet, at: lowest, value: form.value(&lowest) })
-        };
-        let (sides, facets) = rayon::join(
-            || (0..solid.n_sides() as u32).into_par_iter().map(side_low).collect(),
-            || {
-                let facets = 0..solid.mesh().triangles.len() as u32;
-                facets.into_par_iter().filter_map(facet_low).collect()
-            },
-        );
-        Self { sides, facets }
+impl Field<'_> {
+    /// The least F of a facet when that is not at one of its corners.
+    pub(super) fn low(&self, facet: u32) -> Option<f64> {
+        let sides = self.solid.sides()[facet as usize];
+        let on_sides = sides.into_iter().filter_map(|side| self.side_low(side));
+        let least = on_sides.reduce(f64::min)?;
+        Some(self.facet_low(facet).map_or(least, |low| low.value.min(least)))
     }
 
-    /// The least F of a facet that is not at one of its corners.
-    pub(super) fn of_facet(&self, facet: u32, sides: [u32; 3]) -> f64 {
-        let inner = self.facet(facet).map_or(f64::INFINITY, |low| low.value);
-        sides.iter().map(|side| self.sides[*side as usize]).fold(inner, f64::min)
+    /// F at the least place inside a side, if it has one. Always computed from the lower vertex to
+    /// the higher: both facets must decide alike.
+    fn side_low(&self, side: u32) -> Option<f64> {
+        let [low, high] = self.solid.ends(side);
+        let ((a, b), (value_a, value_b)) =
+            ((self.at(low), self.at(high)), (self.value(low), self.value(high)));
+        let dips =
+            self.form.falls_towards(&a, value_a, &b) && self.form.falls_towards(&b, value_b, &a);
+        if !dips {
+            return None;
+        }
+        let t = self.form.lowest_on_line(&a, &(b - a)).filter(|t| 0.0 < *t && *t < 1.0)?;
+        Some(self.form.value(&a.lerp(&b, t))).filter(|least| *least < value_a.min(value_b))
     }
 
-    fn facet(&self, facet: u32) -> Option<&FacetLow> {
-        let at = self.facets.binary_search_by_key(&facet, |low| low.facet).ok()?;
-        Some(&self.facets[at])
+    /// The least place inside a facet, if it has one. Only facets with a dipping side do: from the
+    /// lowest corner F must fall into the facet, hence into a side, whose other end is higher.
+    fn facet_low(&self, facet: u32) -> Option<FacetLow> {
+        let corners = self.solid.mesh().triangles[facet as usize].map(|v| self.at(v));
+        let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+        let lowest = self.form.lowest_in_plane(&corners[0], &normal)?;
+        let is_inside = (0..3).all(|k| {
+            let side = corners[(k + 1) % 3] - corners[k];
+            side.cross(&(lowest - corners[k])).dot(&normal) > 0.0
+        });
+        is_inside.then(|| FacetLow { at: lowest, value: self.form.value(&lowest) })
+    }
+
+    /// A vertex, in convex coordinates.
+    fn at(&self, v: u32) -> Point3<f64> {
+        self.form.convex(&self.solid.mesh().vertices[v as usize])
+    }
+
+    fn value(&self, v: u32) -> f64 {
+        self.form.value_of_level(self.vertex_levels[v as usize])
     }
 }
 
@@ -98,6 +95,7 @@ impl Lows {
 pub(super) struct CurvedCut<'a> {
     cutter: &'a Cutter<'a>,
     form: &'a Form,
+    field: Field<'a>,
     /// Level of the layer.
     level: f64,
     /// F of the layer.
@@ -109,7 +107,8 @@ pub(super) struct CurvedCut<'a> {
 impl<'a> CurvedCut<'a> {
     pub(super) fn new(cutter: &'a Cutter<'a>, level: f64, tolerance: f64) -> Self {
         let form = &cutter.form;
-        Self { cutter, form, level, value: form.value_of_level(level), tolerance }
+        let field = cutter.field();
+        Self { cutter, form, field, level, value: form.value_of_level(level), tolerance }
     }
 
     /// Appends the ways of the outlines through a facet, and the facet itself to `closed` when it
@@ -134,7 +133,7 @@ impl<'a> CurvedCut<'a> {
                 (true, false) => add(sides[side], is_backwards, true),
                 (false, true) => add(sides[side], is_backwards, false),
                 (false, false) => {
-                    if self.cutter.lows.sides[sides[side] as usize] < self.value {
+                    if self.dips(sides[side]) {
                         add(sides[side], is_backwards, false);
                         add(sides[side], is_backwards, true);
                     }
@@ -147,9 +146,15 @@ impl<'a> CurvedCut<'a> {
                 steps.push(Step { enter, leave, facet });
             }
         }
-        if count == 0 && self.cutter.lows.facet(facet).is_some_and(|low| low.value < self.value) {
+        // Facets come here without crossings only when they dip below their corners.
+        if count == 0 && self.field.facet_low(facet).is_some_and(|low| low.value < self.value) {
             closed.push(facet);
         }
+    }
+
+    /// Whether a side with both ends outside K reaches into it.
+    pub(super) fn dips(&self, side: u32) -> bool {
+        self.field.side_low(side).is_some_and(|least| least < self.value)
     }
 
     /// The corners of a facet in pairs with their side, counter-clockwise in convex coordinates.
@@ -175,7 +180,7 @@ impl<'a> CurvedCut<'a> {
         });
         let mut chains: Vec<Chain> = outlines.collect();
         chains.extend(closed.iter().filter_map(|&facet| {
-            let low = self.cutter.lows.facet(facet)?;
+            let low = self.field.facet_low(facet)?;
             let curve = self.cut(facet).closed_curve(&low.at);
             Some(Chain { points: curve.iter().map(|p| self.chart(p)).collect(), closed: true })
         }));
@@ -210,10 +215,8 @@ impl<'a> CurvedCut<'a> {
     }
 
     pub(super) fn cut(&self, facet: u32) -> Cut<'_> {
-        let mesh = self.cutter.solid.mesh();
-        let corners = mesh.triangles[facet as usize];
-        let at = |k: usize| self.form.convex(&mesh.vertices[corners[k] as usize]);
-        let ordered = self.round().map(|(from, _, _)| at(from));
+        let corners = self.cutter.solid.mesh().triangles[facet as usize];
+        let ordered = self.round().map(|(from, _, _)| self.field.at(corners[from]));
         Cut::new(self.form, self.value, ordered, self.tolerance)
     }
 
@@ -225,9 +228,7 @@ impl<'a> CurvedCut<'a> {
     /// facets get the same bits.
     pub(super) fn crossing(&self, crossing: u32) -> Point3<f64> {
         let [low, high] = self.cutter.solid.ends(crossing / 2);
-        let vertices = &self.cutter.solid.mesh().vertices;
-        let (a, b) =
-            (self.form.convex(&vertices[low as usize]), self.form.convex(&vertices[high as usize]));
+        let (a, b) = (self.field.at(low), self.field.at(high));
         let leaves = crossing % 2 == 1;
         let along = b - a;
         let quadratic = self.form.quadratic(self.value, &a, &along);

@@ -22,7 +22,7 @@ mod planar;
 mod vectors;
 
 use chain::{Chain, Step, close_chains, trails};
-use curved::{CurvedCut, Lows};
+use curved::{CurvedCut, Field};
 use geom::region::{Fill, Region, Ring};
 use geom::simplify::simplify_ring;
 use mesh::topology::Solid;
@@ -68,8 +68,6 @@ pub struct Cutter<'a> {
     cuts: Vec<f64>,
     /// Level of every vertex, computed once: two expressions for it could disagree in a last bit.
     vertex_levels: Vec<f64>,
-    /// Places of sides and facets that lie beyond their ends; empty for planes.
-    lows: Lows,
     /// Facets by cut: those of cut `k` are `facets[starts[k]..starts[k + 1]]`, ascending.
     starts: Vec<usize>,
     facets: Vec<u32>,
@@ -91,8 +89,8 @@ impl<'a> Cutter<'a> {
             .map(|facet| crossed(&cuts, reach.of_facet(solid, facet)))
             .collect();
         let (starts, facets) = by_cut(&ranges, cuts.len());
-        let Reach { form, vertex_levels, lows } = reach;
-        Self { solid, surface, form, cuts, vertex_levels, lows, starts, facets }
+        let Reach { form, vertex_levels } = reach;
+        Self { solid, surface, form, cuts, vertex_levels, starts, facets }
     }
 
     /// Cuts the solid along the middle of layer `k`; outlines lie within `tolerance` mm of the
@@ -132,6 +130,11 @@ impl<'a> Cutter<'a> {
         (rings, tears)
     }
 
+    fn field(&self) -> Field<'_> {
+        let Self { solid, form, vertex_levels, .. } = self;
+        Field { solid, form, vertex_levels }
+    }
+
     fn curved_chains(&self, facets: &[u32], k: usize, tolerance: f64) -> Vec<Chain> {
         let cut = CurvedCut::new(self, self.cuts[k], tolerance);
         let mut steps: Vec<Step> = Vec::with_capacity(facets.len());
@@ -157,7 +160,6 @@ pub fn level_range(solid: &Solid, surface: &dyn LayerSurface) -> Option<[f64; 2]
 struct Reach {
     form: Form,
     vertex_levels: Vec<f64>,
-    lows: Lows,
 }
 
 impl Reach {
@@ -165,11 +167,7 @@ impl Reach {
         let form = surface.form();
         let vertex_levels: Vec<f64> =
             solid.mesh().vertices.par_iter().map(|p| surface.level(p)).collect();
-        let lows = match form.is_flat() {
-            true => Lows::default(),
-            false => Lows::new(solid, &form, &vertex_levels),
-        };
-        Self { form, vertex_levels, lows }
+        Self { form, vertex_levels }
     }
 
     /// The least and the greatest level of a facet.
@@ -181,10 +179,8 @@ impl Reach {
         if self.form.is_flat() {
             return [low, high];
         }
-        let least = self.lows.of_facet(facet, solid.sides()[facet as usize]);
-        if least.is_infinite() {
-            return [low, high];
-        }
+        let field = Field { solid, form: &self.form, vertex_levels: &self.vertex_levels };
+        let Some(least) = field.low(facet) else { return [low, high] };
         let beyond = self.form.value_of_level(least);
         [low.min(beyond), high.max(beyond)]
     }
@@ -237,8 +233,7 @@ mod tests {
                 let [low, high] = level_range(&solid, &Plane).unwrap();
                 let cuts: Vec<f64> =
                     (0..=20).map(|k| low + (high - low) * f64::from(k) / 20.0).collect();
-                let mut cutter = Cutter::at_levels(&solid, &Plane, cuts.clone());
-                cutter.lows = Lows::new(&solid, &cutter.form, &cutter.vertex_levels);
+                let cutter = Cutter::at_levels(&solid, &Plane, cuts.clone());
                 for k in 0..cuts.len() {
                     let mut rings = Vec::new();
                     let facets = &cutter.facets[cutter.starts[k]..cutter.starts[k + 1]];

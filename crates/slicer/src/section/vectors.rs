@@ -89,12 +89,11 @@ fn crossings_of_first_side(cut: &CurvedCut<'_>, cutter: &Cutter<'_>) -> Vec<(boo
         let p = cut.crossing(2 * side + u32::from(leaves));
         (leaves, cutter.form.convex(&p))
     };
-    let low = cutter.lows.sides.get(side as usize).copied().unwrap_or(f64::INFINITY);
     match (cut.holds_vertex(0), cut.holds_vertex(1)) {
         (true, true) => vec![],
         (true, false) => vec![at(true)],
         (false, true) => vec![at(false)],
-        (false, false) if low < cut.value => vec![at(false), at(true)],
+        (false, false) if cut.dips(side) => vec![at(false), at(true)],
         (false, false) => vec![],
     }
 }

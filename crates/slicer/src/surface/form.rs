@@ -144,8 +144,25 @@ impl Form {
         }
     }
 
-    /// Returns where on a line F is least, for segments not at all or not only along it monotone:
-    /// `None` when there is no such place.
+    /// Returns whether F falls at first on the way from `a`, where it is `value_a`, to `b`.
+    ///
+    /// Costs no root. A segment that F falls into from both ends has its least place inside, and a
+    /// facet can only have one inside when F falls from its lowest corner into a side.
+    #[must_use]
+    pub fn falls_towards(&self, a: &Point3<f64>, value_a: f64, b: &Point3<f64>) -> bool {
+        let along = b - a;
+        let inner = a.x * along.x + a.y * along.y;
+        match self.kind {
+            Kind::Plane => along.z < 0.0,
+            // The slope times slope·r, which the value tells.
+            Kind::Cone { slope } => (value_a - a.z) * along.z + slope * slope * inner < 0.0,
+            Kind::Spheres { centre_z } => inner + (a.z - centre_z) * along.z < 0.0,
+            // The slope times √(R² − r²), which the value tells.
+            Kind::Caps { radius } => (a.z + radius - value_a) * along.z + inner < 0.0,
+        }
+    }
+
+    /// Returns where on a line F is least; `None` when there is no such place.
     #[must_use]
     pub fn lowest_on_line(&self, a: &Point3<f64>, along: &Vector3<f64>) -> Option<f64> {
         let flat = along.x * along.x + along.y * along.y;
