@@ -14,6 +14,8 @@ mod interrupt;
 mod limits;
 mod names;
 mod program;
+mod rotation;
+mod roundtrip;
 mod run;
 mod settings;
 mod slice;

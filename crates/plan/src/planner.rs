@@ -4,7 +4,7 @@ use machine::gcode::dialect::Space;
 use machine::kinematics::Unreachable;
 use machine::profile::Printer;
 use machine::program::{Joints, Move, Role, Step};
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 use slicer::toolpath::LayerPaths;
 
 use crate::cooling::{CoolingParams, slow_down};
@@ -124,7 +124,7 @@ impl<'a> Planner<'a> {
     ///
     /// [`PlanError`] where a line comes nearer to the axis than the rail can.
     pub fn layer(&mut self, layer: &LayerPaths) -> Result<Vec<Step>, PlanError> {
-        let nozzle = self.router.at().xy();
+        let nozzle = self.begin_at();
         let lines = order(layer, nozzle, &mut self.seams, &self.params.order);
         let items = self.router.layer(layer, &lines, &self.params.speeds, &self.params.filament);
         let mut steps = self.heat(layer.index);
@@ -132,6 +132,16 @@ impl<'a> Planner<'a> {
             self.lower(items).map_err(|source| PlanError { layer: layer.index, source })?;
         steps.extend(planned);
         Ok(steps)
+    }
+
+    /// Where the order of a layer begins: where the nozzle is. Home stands still while the part may
+    /// be turned, so before the first line it is taken to turn with the part: a print then does not
+    /// depend on how the model is turned, but for the way to it.
+    fn begin_at(&self) -> Point2<f64> {
+        if self.totals.moves == 0 {
+            return Point2::new(self.printer.home.s, 0.0);
+        }
+        self.router.at().xy()
     }
 
     /// Plans the end: filament back, nozzle up and out of the way.
