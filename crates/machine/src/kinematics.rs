@@ -10,6 +10,9 @@
 //! `u = ±√(|q|² − v²)`, `theta = atan2(u·qy − v·qx, u·qx + v·qy)`. On a perfect machine this is
 //! the ordinary polar angle and radius.
 //!
+//! The bed's own count of its turn may begin elsewhere and run the other way ([`BedScale`]): in the
+//! formulas above `theta = zero ± turn`.
+//!
 //! Derivation and identifiability of the constants: the calibration of a polar printer's centre,
 //! where the rail misses the axis by `b`. A disc of radius `|v|` about the axis is out of reach of
 //! the nozzle's centre.
@@ -33,6 +36,42 @@ pub struct Alignment {
     pub plate_offset: Vector2<f64>,
     /// How the plate is turned on the bed, radians.
     pub plate_angle: f64,
+    /// How the bed counts its turn.
+    pub bed: BedScale,
+}
+
+/// How the count of the bed's turn relates to where it stands.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct BedScale {
+    /// Azimuth of the rail seen from the bed where the count is zero, radians.
+    pub zero: f64,
+    /// Whether a growing count turns the bed counter-clockwise seen from above. A wrong value
+    /// prints a mirror image.
+    pub is_reversed: bool,
+    /// Turn of the drive that does not reach the bed when the direction changes, radians; see
+    /// [`Backlash`](crate::backlash::Backlash).
+    pub backlash: f64,
+}
+
+impl BedScale {
+    /// A count that begins at the rail and grows as the bed turns clockwise.
+    pub const IDEAL: Self = Self { zero: 0.0, is_reversed: false, backlash: 0.0 };
+
+    /// Returns the azimuth of the rail seen from the bed, radians, not wrapped.
+    #[must_use]
+    pub fn azimuth(&self, turn: BedTurn) -> f64 {
+        self.zero + self.sign() * turn.radians()
+    }
+
+    /// Returns the count at which the rail has this azimuth, radians.
+    #[must_use]
+    pub fn turn(&self, azimuth: f64) -> f64 {
+        self.sign() * (azimuth - self.zero)
+    }
+
+    fn sign(&self) -> f64 {
+        if self.is_reversed { -1.0 } else { 1.0 }
+    }
 }
 
 /// The side of the axis on which the carriage stands.
@@ -77,12 +116,21 @@ pub struct Unreachable {
 }
 
 impl Alignment {
+    /// The machine of the drawing.
+    pub const IDEAL: Self = Self {
+        a: 0.0,
+        b: 0.0,
+        a1: 0.0,
+        b1: 0.0,
+        plate_offset: Vector2::new(0.0, 0.0),
+        plate_angle: 0.0,
+        bed: BedScale::IDEAL,
+    };
+
     /// Returns where in the part the nozzle stands.
     #[must_use]
     pub fn part_from_joints(&self, joints: &Joints) -> Point3<f64> {
-        let nozzle =
-            Vector2::new(joints.s + self.a + self.a1 * joints.z, self.b + self.b1 * joints.z);
-        let over_bed = Rotation2::new(joints.turn.radians()) * nozzle;
+        let over_bed = Rotation2::new(self.bed.azimuth(joints.turn)) * self.nozzle(joints);
         let part = self.part_from_bed(&over_bed);
         Point3::new(part.x, part.y, joints.z)
     }
@@ -109,9 +157,30 @@ impl Alignment {
         let turn = if q == Vector2::zeros() {
             near
         } else {
-            near.nearest((u * q.y - v * q.x).atan2(u * q.x + v * q.y))
+            near.nearest(self.bed.turn((u * q.y - v * q.x).atan2(u * q.x + v * q.y)))
         };
         Ok(Joints { s: u - self.a - self.a1 * part.z, turn, z: part.z })
+    }
+
+    /// Returns where the nozzle stands in Machine, mm.
+    #[must_use]
+    pub fn nozzle(&self, joints: &Joints) -> Vector2<f64> {
+        Vector2::new(joints.s + self.a + self.a1 * joints.z, self.miss(joints.z))
+    }
+
+    /// Returns by how much the rail passes the axis at a height, mm, positive towards +y of
+    /// Machine.
+    #[must_use]
+    pub fn miss(&self, z: f64) -> f64 {
+        self.b + self.b1 * z
+    }
+
+    /// Returns how near to the axis the nozzle can be, anywhere up to `height`, while the carriage
+    /// and the nozzle both keep `clearance` from the middle of the rail, mm.
+    #[must_use]
+    pub fn clear_radius(&self, clearance: f64, height: f64) -> f64 {
+        let worst = |at_bed: f64, lean: f64| at_bed.abs().max((at_bed + lean * height).abs());
+        (clearance + worst(self.a, self.a1)).hypot(worst(self.b, self.b1))
     }
 
     /// Returns the point of the bed, seen from the axis, on which a point of the part lies.
@@ -139,6 +208,7 @@ mod tests {
         b1: -0.002,
         plate_offset: Vector2::new(0.3, -0.4),
         plate_angle: 0.05,
+        bed: BedScale { zero: 0.7, is_reversed: true, backlash: 0.0 },
     };
 
     #[test]

@@ -3,11 +3,15 @@
 //! [`profile`] is the printer as facts: axes, limits, nozzle. [`kinematics`] turns places in the
 //! part into joint positions and back, with the machine's own misalignment. [`program`] is the
 //! motion program in joints, and [`gcode`] writes it as text in the words of a firmware and reads
-//! text back.
+//! text back. [`height_map`], [`backlash`] and [`plate_shift`] are corrections that stand beside the
+//! kinematics.
 //!
 //! This crate knows neither meshes nor slicing: it must stay useful alone, for calibration.
 
+pub mod backlash;
 pub mod gcode;
+pub mod height_map;
 pub mod kinematics;
+pub mod plate_shift;
 pub mod profile;
 pub mod program;

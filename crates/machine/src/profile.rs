@@ -39,6 +39,11 @@ pub struct Printer {
     pub bed_temperature_max: f64,
     /// How rail, column and plate miss their ideal places.
     pub alignment: crate::kinematics::Alignment,
+    /// How high the bed lies, as it was probed.
+    pub bed_map: crate::height_map::HeightMap,
+    /// Most turns of the bed from where it was homed, either way, radians; infinite where no wire
+    /// runs to the bed.
+    pub most_turn: f64,
 }
 
 /// A straight axis.

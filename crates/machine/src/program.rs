@@ -8,7 +8,8 @@ use nalgebra::Point3;
 
 /// The turn of the bed, accumulated over the whole program and never wrapped, radians.
 ///
-/// It grows when the nozzle runs counter-clockwise over the part. A wrapped angle where an
+/// It is the bed's own count: unless the machine's [`BedScale`](crate::kinematics::BedScale) says
+/// otherwise it grows when the nozzle runs counter-clockwise over the part. A wrapped angle where an
 /// accumulated one belongs would spin the bed back by whole turns; hence the type.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default)]
 pub struct BedTurn(f64);

@@ -1,6 +1,9 @@
 //! The kinematics against published numbers, where the folder with the vectors is at hand.
 
-use machine::kinematics::{Alignment, Branch};
+use machine::backlash::Backlash;
+use machine::height_map::HeightMap;
+use machine::kinematics::{Alignment, BedScale, Branch};
+use machine::plate_shift::PlateShift;
 use machine::program::{BedTurn, Joints};
 use nalgebra::{Point3, Vector2};
 use serde_json::Value;
@@ -27,6 +30,7 @@ fn alignment(models: &Value, name: &Value) -> Alignment {
         b1: number(model, "b1"),
         plate_offset: Vector2::new(number(model, "ex"), number(model, "ey")),
         plate_angle: number(model, "psi"),
+        ..Alignment::IDEAL
     }
 }
 
@@ -61,6 +65,130 @@ fn forward_and_inverse() {
                 assert!(off.abs() < 1e-9, "{case}: {joints:?}");
             }
             Err(_) => assert_eq!(case["reachable"], Value::Bool(false), "{case}"),
+        }
+    }
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    let list = value.as_array().expect("a list of numbers");
+    list.iter().map(|n| n.as_f64().expect("a number")).collect()
+}
+
+#[test]
+fn the_bed_is_unwrapped_along_a_path() {
+    let Some(all) = vectors("calibration.json") else { return };
+    let path = &all["unwrap_path"];
+    let alignment = alignment(&all["models"], &path["model"]);
+    let mut turn = BedTurn::accumulated(number(path, "theta_start"));
+    for point in path["points_x_y_s_theta"].as_array().unwrap() {
+        let [x, y, s, theta] = numbers(point)[..] else { panic!("{point}") };
+        let part = Point3::new(x, y, 0.0);
+        let joints = alignment.joints_from_part(&part, Branch::Near, turn).unwrap();
+        assert!((joints.s - s).abs() < 1e-9, "{point}");
+        assert!((joints.turn.radians() - theta).abs() < 1e-9, "{point}");
+        turn = joints.turn;
+    }
+}
+
+#[test]
+fn the_words_of_a_bed_that_counts_its_own_way() {
+    let Some(all) = vectors("calibration.json") else { return };
+    for case in all["words"].as_array().unwrap() {
+        let bed = BedScale {
+            zero: number(case, "theta0"),
+            is_reversed: number(case, "sigma") < 0.0,
+            backlash: 0.0,
+        };
+        let theta = number(case, "theta");
+        let turn = bed.turn(theta);
+        assert!((turn.to_degrees() - number(case, "C_deg")).abs() < 1e-9, "{case}");
+        assert!((bed.azimuth(BedTurn::accumulated(turn)) - theta).abs() < 1e-12, "{case}");
+    }
+}
+
+#[test]
+fn a_constant_shift_and_what_it_does_not_correct() {
+    let Some(all) = vectors("calibration.json") else { return };
+    let example = &all["thesis_example"];
+    let by = Vector2::new(number(example, "dx"), number(example, "dy"));
+    let (radius, angle) = PlateShift { by }.shifted(number(example, "R"), number(example, "phi"));
+    assert!((radius - number(example, "R_new")).abs() < 1e-9);
+    assert!((angle - number(example, "phi_new")).abs() < 1e-9);
+    for case in all["thesis_error_offaxis"].as_array().unwrap() {
+        let shift = numbers(&case["d"]);
+        let shift = PlateShift { by: Vector2::new(shift[0], shift[1]) };
+        let (x, y) = (number(case, "x"), number(case, "y"));
+        let (s, theta) = shift.shifted(x.hypot(y), y.atan2(x));
+        let real = Alignment { b: number(case, "b"), ..Alignment::IDEAL };
+        let turn = BedTurn::accumulated(theta);
+        let off = real.part_from_joints(&Joints { s, turn, z: 0.0 }) - Point3::new(x, y, 0.0);
+        assert!((off.x - number(case, "err_x")).abs() < 1e-9, "{case}: {off}");
+        assert!((off.y - number(case, "err_y")).abs() < 1e-9, "{case}: {off}");
+    }
+}
+
+#[test]
+fn the_drive_runs_ahead_by_half_its_play() {
+    let Some(all) = vectors("calibration.json") else { return };
+    let case = &all["backlash"];
+    assert_eq!(number(case, "initial_direction"), 1.0);
+    let theta = numbers(&case["theta"]);
+    let mut backlash = Backlash::new(number(case, "B"), BedTurn::accumulated(theta[0]));
+    for (theta, wanted) in theta.iter().zip(numbers(&case["theta_cmd"])) {
+        let to = BedTurn::accumulated(*theta);
+        backlash.take_up(to);
+        assert!((backlash.follow(to).radians() - wanted).abs() < 1e-12, "{theta}");
+    }
+}
+
+#[test]
+fn the_height_map_fades_as_published() {
+    let Some(all) = vectors("calibration.json") else { return };
+    for case in all["z_model"].as_array().unwrap() {
+        let q = numbers(&case["q"]);
+        let (z, fade) = (number(case, "z"), number(case, "fade"));
+        let plane =
+            |x: f64, y: f64| number(case, "h0") + number(case, "tx") * x + number(case, "ty") * y;
+        let corners =
+            [[-100.0, -100.0], [100.0, -100.0], [100.0, 100.0], [-100.0, 100.0], [3.0, 8.0]];
+        let probes = corners.map(|[x, y]| [x, y, plane(x, y)]);
+        let map = HeightMap::new(&probes, fade).unwrap();
+        // The slope of the rail itself is not part of a map of the bed.
+        let of_rail = (1.0 - z / fade).max(0.0) * number(case, "g1") * number(case, "u");
+        let lift = map.lift(&Vector2::new(q[0], q[1]), z) + of_rail;
+        assert!((lift - number(case, "z_cmd")).abs() < 1e-9, "{case}: {lift}");
+    }
+}
+
+#[test]
+fn rates_along_a_line_are_those_of_the_theory() {
+    let Some(all) = vectors("calibration.json") else { return };
+    // Central differences of the inverse: 1e-3 mm is short against the 0.6 mm of the nearest line
+    // and long against its last digits.
+    let step = 1e-3;
+    for case in all["line_derivatives"].as_array().unwrap() {
+        let real = Alignment { b: number(case, "b"), ..Alignment::IDEAL };
+        let joints = |y: f64| {
+            let part = Point3::new(number(case, "d"), y, 0.0);
+            real.joints_from_part(&part, Branch::Near, BedTurn::default()).unwrap()
+        };
+        let y = number(case, "y");
+        if y.abs() < step && number(case, "du") == 0.0 && number(case, "b") != 0.0 {
+            continue;
+        }
+        let [low, here, high] = [y - step, y, y + step].map(joints);
+        let first = |f: fn(&Joints) -> f64| (f(&high) - f(&low)) / (2.0 * step);
+        let second = |f: fn(&Joints) -> f64| (f(&high) - 2.0 * f(&here) + f(&low)) / (step * step);
+        let rail = |joints: &Joints| joints.s;
+        let bed = |joints: &Joints| joints.turn.radians();
+        for (name, value) in [
+            ("du", first(rail)),
+            ("dtheta", first(bed)),
+            ("d2u", second(rail)),
+            ("d2theta", second(bed)),
+        ] {
+            let wanted = number(case, name);
+            assert!((value - wanted).abs() < 1e-4 * (1.0 + wanted.abs()), "{name} {value} {case}");
         }
     }
 }

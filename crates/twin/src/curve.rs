@@ -50,11 +50,12 @@ impl Curve {
     #[must_use]
     pub fn between_joints(from: &Joints, to: &Joints, alignment: &Alignment) -> Self {
         let start = nozzle_over_rail(from, alignment);
+        let turn_from = alignment.bed.azimuth(from.turn);
         Self {
             from: start,
             by: nozzle_over_rail(to, alignment) - start,
-            turn_from: from.turn.radians(),
-            turn_by: to.turn.radians() - from.turn.radians(),
+            turn_from,
+            turn_by: alignment.bed.azimuth(to.turn) - turn_from,
             lift: to.z - from.z,
         }
     }
@@ -236,6 +237,7 @@ mod tests {
         b1: -0.002,
         plate_offset: Vector2::new(0.3, -0.4),
         plate_angle: 0.05,
+        ..Alignment::IDEAL
     };
 
     fn joints(s: f64, turn: f64, z: f64) -> Joints {

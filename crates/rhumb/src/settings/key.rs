@@ -292,6 +292,28 @@ pub const KEYS: &[Key] = &[
         (20.0, 0.0, 1000.0),
         "turning speed that the bed may jump by, for the time estimate",
     ),
+    Key {
+        name: "bed_reversed",
+        section: Printer,
+        kind: Kind::Switch,
+        default: Default::Switch(false),
+        program_name: "bed_reversed",
+        meaning: "whether a growing angle turns the bed counter-clockwise seen from above",
+    },
+    number(
+        Printer,
+        "turns_max",
+        "turns_max",
+        (0.0, 0.0, 1_000_000.0),
+        "turns of the bed from home, either way, that its wires allow; 0 for no bound",
+    ),
+    number(
+        Printer,
+        "bed_map_fade_mm",
+        "bed_map_fade",
+        (10.0, 0.1, 1000.0),
+        "height above which a probed bed is no longer corrected for",
+    ),
     number(
         Printer,
         "z_max_mm",

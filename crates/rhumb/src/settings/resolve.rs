@@ -2,7 +2,8 @@
 
 use geom::tolerance::Tolerances;
 use machine::gcode::Dialect;
-use machine::kinematics::Alignment;
+use machine::height_map::HeightMap;
+use machine::kinematics::{Alignment, BedScale};
 use machine::profile::{Axis, Printer, Turntable};
 use machine::program::{BedTurn, Joints};
 use mesh::flats::FlatParams;
@@ -145,8 +146,18 @@ fn printer(get: &Lookup<'_>) -> Printer {
         nozzle_temperature_max: get.number("max_nozzle_temperature_c"),
         nozzle_temperature_min_extrude: get.number("min_extrude_temperature_c"),
         bed_temperature_max: get.number("max_bed_temperature_c"),
-        alignment: Alignment::default(),
+        alignment: Alignment {
+            bed: BedScale { is_reversed: get.switch("bed_reversed"), ..BedScale::IDEAL },
+            ..Alignment::IDEAL
+        },
+        bed_map: HeightMap::default(),
+        most_turn: most_turn(get.number("turns_max")),
     }
+}
+
+/// Bound of the bed's turn, radians; 0 turns stand for none.
+fn most_turn(turns: f64) -> f64 {
+    if turns > 0.0 { turns * std::f64::consts::TAU } else { f64::INFINITY }
 }
 
 fn check_printer(printer: &Printer) -> Result<(), Failure> {

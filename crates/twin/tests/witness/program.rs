@@ -40,6 +40,8 @@ pub(crate) fn printer() -> Printer {
         nozzle_temperature_min_extrude: 170.0,
         bed_temperature_max: 110.0,
         alignment: Alignment::default(),
+        bed_map: Default::default(),
+        most_turn: f64::INFINITY,
     }
 }
 

@@ -20,6 +20,7 @@ const LEANING: Alignment = Alignment {
     b1: -0.002,
     plate_offset: Vector2::new(0.3, -0.4),
     plate_angle: 0.05,
+    ..Alignment::IDEAL
 };
 
 fn some_joints() -> impl Strategy<Value = Joints> {
