@@ -583,7 +583,7 @@ G1 R22.23 T11.2936 E0.00141
 ;WIDTH:0.26
 G1 R22.314 T11.1614 E0.00144 F457.6
 G1 E-0.8 F2100
-G1 Z6.5 F891
+G1 Z6.5 F891 ;E
 G1 R120 T11.1614 F7200
 M104 S0
 M140 S0
@@ -606,6 +606,9 @@ M84
 ; bed_speed = 360
 ; bed_acceleration = 3000
 ; bed_jerk = 20
+; bed_reversed = 0
+; turns_max = 0
+; bed_map_fade = 10
 ; max_print_height = 200
 ; machine_max_feedrate_z = 15
 ; machine_max_acceleration_z = 300
@@ -639,6 +642,11 @@ M84
 ; disable_fan_first_layers = 1
 ; slowdown_below_layer_time = 8
 ; min_print_speed = 10
+; layers = planar
+; cone_angle = 30
+; sphere_centre = -60
+; cap_radius = 100
+; base_layers = 2
 ; layer_height = 0.2
 ; first_layer_height = 0.2
 ; snap = optimal

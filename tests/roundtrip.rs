@@ -1,6 +1,6 @@
 //! What is written as text and read again is the same program, but for the last decimal place.
 
-use machine::gcode::dialect::{ALL, Dialect, Space};
+use machine::gcode::dialect::{CARTESIAN, Dialect, POLAR, Space};
 use machine::gcode::{Emitter, parse_line};
 use machine::program::{BedTurn, Joints, Layer, Move, Role, Step};
 use nalgebra::Point3;
@@ -89,11 +89,11 @@ fn read(text: &str, dialect: &Dialect) -> Vec<(Modal, f64)> {
 fn same_place(modal: &Modal, wanted: &Move, dialect: &Dialect) -> Result<(), TestCaseError> {
     prop_assert!((modal.z - wanted.to.z).abs() <= HALF * 1e-3);
     let from_axis = match dialect.space {
-        Space::Joints => wanted.to.s.abs(),
+        Space::Joints | Space::IdealPlane => wanted.to.s.abs(),
         Space::Part => wanted.at.xy().coords.norm(),
     };
     let places = if from_axis < 2.0 { 1e-5 } else { 1e-3 };
-    match dialect.joints(modal.plane, modal.z) {
+    match dialect.joints(modal.plane, modal.z, wanted.to.turn) {
         Some(joints) => {
             prop_assert!((joints.s - wanted.to.s).abs() <= HALF * places);
             let turn = joints.turn.radians() - wanted.to.turn.radians();
@@ -144,14 +144,14 @@ proptest! {
 
     #[test]
     fn moves_are_read_as_they_were_written(steps in program()) {
-        for dialect in &ALL {
+        for dialect in &[POLAR, CARTESIAN] {
             is_read_as_written(&steps, dialect)?;
         }
     }
 
     #[test]
     fn roles_layers_and_fan_are_read_as_they_were_written(step in other()) {
-        let text = text(ALL[0], std::slice::from_ref(&step));
+        let text = text(POLAR, std::slice::from_ref(&step));
         let has = |line: &str| text.lines().any(|l| l == line);
         match step {
             Step::Bead(role, width) => {

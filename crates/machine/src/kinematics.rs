@@ -103,16 +103,40 @@ impl Branch {
     }
 }
 
-/// The nozzle cannot stand over a point of the bed.
+/// The machine cannot get to a place.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error(
-    "the nozzle passes the rotation axis at {miss:.3} mm and cannot stand {radius:.3} mm from it"
-)]
-pub struct Unreachable {
-    /// Distance of the point from the axis, mm.
-    pub radius: f64,
-    /// Least distance that the nozzle can have, mm.
-    pub miss: f64,
+pub enum Unreachable {
+    /// The nozzle cannot stand over a point of the bed.
+    #[error(
+        "the nozzle passes the rotation axis at {miss:.3} mm and cannot stand {radius:.3} mm from \
+         it"
+    )]
+    Disc {
+        /// Distance of the point from the axis, mm.
+        radius: f64,
+        /// Least distance that the nozzle can have, mm.
+        miss: f64,
+    },
+    /// An axis ends before.
+    #[error("the {axis} would have to go to {position:.3} mm, it reaches from {min} to {max} mm")]
+    BeyondTravel {
+        /// Its name.
+        axis: &'static str,
+        /// mm.
+        position: f64,
+        /// mm.
+        min: f64,
+        /// mm.
+        max: f64,
+    },
+    /// One line winds further round the axis than the wires of the bed allow.
+    #[error("the bed would have to turn {turns:.1} times from home, its wires allow {most}")]
+    WoundUp {
+        /// Turns from home.
+        turns: f64,
+        /// The bound.
+        most: f64,
+    },
 }
 
 impl Alignment {
@@ -140,7 +164,7 @@ impl Alignment {
     ///
     /// # Errors
     ///
-    /// [`Unreachable`] inside the disc that the rail misses.
+    /// [`Unreachable::Disc`] inside the disc that the rail misses.
     pub fn joints_from_part(
         &self,
         part: &Point3<f64>,
@@ -151,7 +175,7 @@ impl Alignment {
         let v = self.b + self.b1 * part.z;
         let square = q.norm_squared() - v * v;
         if square < 0.0 {
-            return Err(Unreachable { radius: q.norm(), miss: v.abs() });
+            return Err(Unreachable::Disc { radius: q.norm(), miss: v.abs() });
         }
         let u = branch.sign() * square.sqrt();
         let turn = if q == Vector2::zeros() {
@@ -245,7 +269,7 @@ mod tests {
         let alignment = Alignment { b: 0.5, ..Alignment::default() };
         let inside = Point3::new(0.3, -0.2, 0.0);
         let error = alignment.joints_from_part(&inside, Branch::Near, BedTurn::default());
-        assert_eq!(error.unwrap_err().miss, 0.5);
+        assert!(matches!(error, Err(Unreachable::Disc { miss: 0.5, .. })), "{error:?}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The kinematics of any machine: forward undoes inverse, on both sides of the axis.
 
-use machine::kinematics::{Alignment, BedScale, Branch};
+use machine::kinematics::{Alignment, BedScale, Branch, Unreachable};
 use machine::program::BedTurn;
 use nalgebra::{Point3, Vector2};
 use proptest::prelude::*;
@@ -44,7 +44,8 @@ proptest! {
                 Err(out) => {
                     let radius = machine.over_bed(&part.xy()).norm();
                     prop_assert!(radius <= machine.miss(z).abs());
-                    prop_assert_eq!(out.miss, machine.miss(z).abs());
+                    let expected = Unreachable::Disc { radius, miss: machine.miss(z).abs() };
+                    prop_assert_eq!(out, expected);
                 }
             }
         }

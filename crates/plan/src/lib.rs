@@ -19,6 +19,7 @@ pub mod route;
 pub mod seam;
 pub mod speed;
 pub mod time;
+mod winding;
 
 #[cfg(test)]
 mod testing;

@@ -1,6 +1,5 @@
 //! The planner: one layer after the other becomes steps of the program.
 
-use machine::gcode::dialect::Space;
 use machine::kinematics::Unreachable;
 use machine::profile::Printer;
 use machine::program::{Joints, Move, Role, Step};
@@ -108,7 +107,7 @@ impl<'a> Planner<'a> {
         Self {
             printer,
             params,
-            limits: Limits::of(printer, params.resample.dialect.space == Space::Joints),
+            limits: Limits::of(printer, params.resample.dialect.space),
             router: Router::new(resampler.at(), printer.lift.speed, printed),
             resampler,
             seams: SeamMemory::default(),

@@ -16,13 +16,15 @@
 
 use machine::gcode::Dialect;
 use machine::gcode::dialect::Space;
+use machine::height_map::HeightMap;
 use machine::kinematics::{Alignment, Branch, Unreachable};
-use machine::profile::Printer;
+use machine::profile::{Axis, Printer};
 use machine::program::{BedTurn, Joints};
 use nalgebra::{Point2, Point3, Rotation2};
 
-use crate::axis::{Piece, distance_to_axis, keep_clear, outside};
+use crate::axis::{Piece, keep_clear, outside};
 use crate::route::{Kind, Stroke};
+use crate::winding::{extent, unwinding};
 
 /// How closely moves follow strokes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,6 +66,27 @@ const LARGEST_TURN: f64 = std::f64::consts::FRAC_PI_3;
 /// and braked in steps; large enough that few moves are tiny.
 const ARC_STEP: f64 = std::f64::consts::FRAC_PI_6;
 
+/// The same where the firmware runs straight between the ends of a move, so that its chord must
+/// keep clear too: the ends lie 0.5 % farther out.
+const ARC_CHORD: f64 = std::f64::consts::PI / 16.0;
+
+/// In such a move the speed of the bed is not even. Half of its turn may be done this share of it
+/// before or after half of the way, which keeps the speed within 10 % of its mean.
+const LARGEST_UNEVENNESS: f64 = 0.025;
+
+/// Moves that turn the bed by less are even enough, radians: 0.6°.
+const SMALL_TURN: f64 = 0.01;
+
+/// How far a nozzle that runs straight may be from the height of the bed as it was probed, mm: a
+/// fortieth of a layer.
+const HEIGHT_TOLERANCE_MM: f64 = 0.005;
+
+/// What is shorter is the last digits of one place, mm: a tenth of the finest last place.
+const LEAST_PATH_MM: f64 = 1e-6;
+
+/// How far an axis may be sent beyond its end, mm: what rounding does to a position at the end.
+const REACH_SLACK_MM: f64 = 5e-4;
+
 /// Halvings after which a piece is taken as it is; 2⁻⁴⁰ of any stroke is far below a step.
 const MOST_HALVINGS: u32 = 40;
 
@@ -73,6 +96,11 @@ pub struct Resampler {
     alignment: Alignment,
     params: ResampleParams,
     clearance: f64,
+    rail: Axis,
+    lift: Axis,
+    bed_map: HeightMap,
+    /// How far the bed may turn from home, radians.
+    most_turn: f64,
     /// How far from the axis the far side of the rail reaches, mm; negative when it does not.
     far_reach: f64,
     joints: Joints,
@@ -95,11 +123,21 @@ impl Resampler {
     #[must_use]
     pub fn new(printer: &Printer, params: ResampleParams) -> Self {
         let at = printer.alignment.part_from_joints(&printer.home);
+        let clearance = printer.alignment.clear_radius(printer.axis_clearance, printer.lift.max);
+        let chords_keep_clear = match params.dialect.space {
+            Space::IdealPlane => (ARC_CHORD / 2.0).cos(),
+            Space::Joints | Space::Part => 1.0,
+        };
+        let reaches_far_side = params.dialect.reaches_far_side();
         Self {
             alignment: printer.alignment,
             params,
-            clearance: printer.axis_clearance,
-            far_reach: -printer.rail.min,
+            clearance: clearance / chords_keep_clear,
+            rail: printer.rail,
+            lift: printer.lift,
+            bed_map: printer.bed_map.clone(),
+            most_turn: if reaches_far_side { printer.most_turn } else { f64::INFINITY },
+            far_reach: if reaches_far_side { -printer.rail.min } else { f64::NEG_INFINITY },
             joints: printer.home,
             branch: Branch::Near,
             over_bed: Point2::from(printer.alignment.over_bed(&at.xy())),
@@ -136,9 +174,10 @@ impl Resampler {
             if self.params.dialect.space == Space::Part {
                 self.straight(stroke, at, &mut legs);
             } else if stroke.kind == Kind::Filament || target.over_bed == self.over_bed {
-                self.standing(stroke, target.z, &mut legs);
+                self.standing(stroke, target.z, &mut legs)?;
             } else {
                 self.across(strokes, index, target, &mut legs)?;
+                self.unwind(strokes, index, &mut legs)?;
             }
             all.push(legs);
         }
@@ -167,11 +206,17 @@ impl Resampler {
     }
 
     /// A stroke that moves the lift or the filament only.
-    fn standing(&mut self, stroke: &Stroke, z: f64, legs: &mut Vec<Leg>) {
+    fn standing(
+        &mut self,
+        stroke: &Stroke,
+        z: f64,
+        legs: &mut Vec<Leg>,
+    ) -> Result<(), Unreachable> {
+        within(&self.lift, "lift", z)?;
         let to = self.params.dialect.rounded_joints(&Joints { z, ..self.joints });
         let path = if stroke.kind == Kind::Filament { 0.0 } else { (to.z - self.joints.z).abs() };
         if path == 0.0 && stroke.filament == 0.0 {
-            return;
+            return Ok(());
         }
         self.joints = to;
         self.at_part = self.alignment.part_from_joints(&to);
@@ -183,6 +228,41 @@ impl Resampler {
             path,
             speed: stroke.speed,
         });
+        Ok(())
+    }
+
+    /// Unwinds the bed after a travel, where the lines that follow would wind it too far.
+    fn unwind(
+        &mut self,
+        strokes: &[Stroke],
+        index: usize,
+        legs: &mut Vec<Leg>,
+    ) -> Result<(), Unreachable> {
+        if strokes[index].kind != Kind::Travel || !self.most_turn.is_finite() {
+            return Ok(());
+        }
+        let run = strokes[index + 1..].iter().take_while(|s| s.kind != Kind::Travel);
+        let azimuth = |p: Point2<f64>| self.alignment.bed.turn(p.y.atan2(p.x));
+        let places = run.map(|stroke| {
+            let at = Rotation2d(self.params.azimuth).turn(&stroke.to);
+            azimuth(Point2::from(self.alignment.over_bed(&at.xy())))
+        });
+        let run = extent(std::iter::once(azimuth(self.over_bed)).chain(places));
+        let from = self.joints;
+        let turn = unwinding(from.turn.radians(), &run, self.most_turn)?;
+        let pieces = (turn.abs() / LARGEST_TURN).ceil() as u32;
+        for k in 1..=pieces {
+            let done = turn * f64::from(k) / f64::from(pieces);
+            let turn = BedTurn::accumulated(from.turn.radians() + done);
+            let to = Joints { turn, ..from };
+            let part = self.alignment.part_from_joints(&to);
+            let over_bed = Point2::from(self.alignment.over_bed(&part.xy()));
+            self.push(Kind::Travel, to, &Target { over_bed, z: to.z }, legs)?;
+            if let Some(leg) = legs.last_mut() {
+                leg.speed = strokes[index].speed;
+            }
+        }
+        Ok(())
     }
 
     /// A stroke across the bed.
@@ -261,7 +341,9 @@ impl Resampler {
         legs: &mut Vec<Leg>,
     ) -> Result<(), Unreachable> {
         let to = self.joints_at(target)?;
-        if halvings < MOST_HALVINGS && !self.is_near_enough(&to, target, tolerance) {
+        let is_near_enough = self.is_near_enough(&to, target, tolerance)
+            && (kind != Kind::Print || self.follows_bed(target));
+        if halvings < MOST_HALVINGS && !is_near_enough {
             let middle = Target {
                 over_bed: nalgebra::center(&self.over_bed, &target.over_bed),
                 z: f64::midpoint(self.joints.z, target.z),
@@ -269,8 +351,7 @@ impl Resampler {
             self.line(kind, &middle, tolerance, halvings + 1, legs)?;
             return self.line(kind, target, tolerance, halvings + 1, legs);
         }
-        self.push(kind, to, target, legs);
-        Ok(())
+        self.push(kind, to, target, legs)
     }
 
     /// Whether the move to `to` stays within the tolerance of the straight line to `target`.
@@ -285,10 +366,43 @@ impl Resampler {
             return true;
         }
         let unit = along / length;
+        let is_near = |joints: &Joints| {
+            unit.perp(&(self.over_bed_at(joints) - self.over_bed)).abs() <= tolerance
+        };
+        // Firmwares that take part coordinates run some moves straight and some, in pieces of their
+        // own choice, as the joints do: both ways must be near.
         [0.25, 0.5, 0.75].into_iter().all(|share| {
-            let p = self.over_bed_at(&between(&self.joints, to, share));
-            unit.perp(&(p - self.over_bed)).abs() <= tolerance
-        })
+            is_near(&machine::gcode::dialect::POLAR.between(&self.joints, to, share))
+                && (self.params.dialect.space == Space::Joints
+                    || is_near(&self.params.dialect.between(&self.joints, to, share)))
+        }) && self.turns_evenly(to, turn)
+    }
+
+    /// Whether the lift, running evenly, keeps to the bed as it was probed.
+    fn follows_bed(&self, target: &Target) -> bool {
+        let map = &self.bed_map;
+        if map.is_flat() || self.joints.z.min(target.z) >= map.fade() {
+            return true;
+        }
+        let (from, to) = (self.over_bed.coords, target.over_bed.coords);
+        let lift = |share: f64| {
+            let z = self.joints.z + (target.z - self.joints.z) * share;
+            map.lift(&from.lerp(&to, share), z)
+        };
+        let (low, high) = (lift(0.0), lift(1.0));
+        [0.25, 0.5, 0.75]
+            .into_iter()
+            .all(|share| (lift(share) - low - (high - low) * share).abs() <= HEIGHT_TOLERANCE_MM)
+    }
+
+    /// Whether the bed turns evenly enough in a move that is straight over an ideal machine.
+    fn turns_evenly(&self, to: &Joints, turn: f64) -> bool {
+        if self.params.dialect.space == Space::Joints || turn.abs() < SMALL_TURN {
+            return true;
+        }
+        let half = self.params.dialect.between(&self.joints, to, 0.5);
+        let done = half.turn.radians() - self.joints.turn.radians();
+        (done - turn / 2.0).abs() <= LARGEST_UNEVENNESS * turn.abs()
     }
 
     /// A piece of a circle about the axis.
@@ -302,7 +416,11 @@ impl Resampler {
         let start = self.over_bed.coords;
         let rise = target.z - self.joints.z;
         let base = self.joints.z;
-        let pieces = (sweep.abs() / ARC_STEP).ceil().max(1.0) as u32;
+        let step = match self.params.dialect.space {
+            Space::IdealPlane => ARC_CHORD,
+            Space::Joints | Space::Part => ARC_STEP,
+        };
+        let pieces = (sweep.abs() / step).ceil().max(1.0) as u32;
         for k in 1..=pieces {
             let share = f64::from(k) / f64::from(pieces);
             let over_bed = if k == pieces {
@@ -312,7 +430,7 @@ impl Resampler {
             };
             let step = Target { over_bed, z: base + rise * share };
             let to = self.joints_at(&step)?;
-            self.push(kind, to, &step, legs);
+            self.push(kind, to, &step, legs)?;
         }
         Ok(())
     }
@@ -325,21 +443,29 @@ impl Resampler {
         legs: &mut Vec<Leg>,
     ) -> Result<(), Unreachable> {
         let to = self.joints_at(target)?;
-        self.push(kind, to, target, legs);
-        Ok(())
+        self.push(kind, to, target, legs)
     }
 
-    fn push(&mut self, kind: Kind, to: Joints, target: &Target, legs: &mut Vec<Leg>) {
+    fn push(
+        &mut self,
+        kind: Kind,
+        to: Joints,
+        target: &Target,
+        legs: &mut Vec<Leg>,
+    ) -> Result<(), Unreachable> {
+        within(&self.rail, "carriage", to.s)?;
+        within(&self.lift, "lift", to.z)?;
         let to = self.params.dialect.rounded_joints(&to);
         let path = self.path_length(&to);
-        if path == 0.0 {
-            return;
+        if path < LEAST_PATH_MM {
+            return Ok(());
         }
         self.joints = to;
         self.over_bed = target.over_bed;
         let at = self.alignment.part_from_joints(&to);
         self.at_part = at;
         legs.push(Leg { kind, to, at, filament: 0.0, path, speed: 0.0 });
+        Ok(())
     }
 
     /// Length of the way of the nozzle over the part in one move.
@@ -350,7 +476,8 @@ impl Resampler {
         let mut from = self.alignment.part_from_joints(&self.joints);
         (1..=pieces)
             .map(|k| {
-                let joints = between(&self.joints, to, f64::from(k) / f64::from(pieces));
+                let share = f64::from(k) / f64::from(pieces);
+                let joints = self.params.dialect.between(&self.joints, to, share);
                 let next = self.alignment.part_from_joints(&joints);
                 let length = (next - from).norm();
                 from = next;
@@ -375,13 +502,16 @@ impl Resampler {
         if self.far_reach <= 0.0 {
             return false;
         }
-        let (a, b) = (self.over_bed, target.over_bed);
+        let (a, b) = (self.over_bed.coords, target.over_bed.coords);
+        let Some(unit) = (b - a).try_normalize(0.0) else { return false };
+        // The carriage runs along a line that passes the axis as the rail does.
+        let miss = self.alignment.miss(target.z);
+        let wanted = if self.branch == Branch::Near { -miss } else { miss };
         // A pass needs room on both sides, or it is an end on the axis.
         let room = 2.0 * self.params.chord;
-        distance_to_axis(&a, &b) <= self.params.chord
-            && a.coords.norm() > room
-            && b.coords.norm() > room
-            && a.coords.dot(&b.coords) < 0.0
+        (unit.perp(&a) - wanted).abs() <= self.params.chord
+            && -unit.dot(&a) > room
+            && unit.dot(&b) > room
             && self.reaches_run(strokes, index, self.branch.opposite())
     }
 
@@ -428,13 +558,13 @@ fn way_lengths(way: &[Piece], from: Point2<f64>, clearance: f64) -> Vec<f64> {
         .collect()
 }
 
-fn between(a: &Joints, b: &Joints, share: f64) -> Joints {
-    let blend = |from: f64, to: f64| from + (to - from) * share;
-    Joints {
-        s: blend(a.s, b.s),
-        turn: BedTurn::accumulated(blend(a.turn.radians(), b.turn.radians())),
-        z: blend(a.z, b.z),
+/// Whether an axis reaches a position.
+fn within(axis: &Axis, name: &'static str, position: f64) -> Result<(), Unreachable> {
+    let Axis { min, max, .. } = *axis;
+    if position < min - REACH_SLACK_MM || position > max + REACH_SLACK_MM {
+        return Err(Unreachable::BeyondTravel { axis: name, position, min, max });
     }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -466,7 +596,7 @@ mod tests {
         let mut worst: f64 = 0.0;
         for leg in legs {
             for k in 0..=50 {
-                let p = Alignment::default().part_from_joints(&between(
+                let p = Alignment::default().part_from_joints(&POLAR.between(
                     &from,
                     &leg.to,
                     f64::from(k) / 50.0,

@@ -11,6 +11,7 @@
 //! the rule holds everywhere; of two moves the one that is faster in the violated axis gives way.
 //! Durations only ever grow, and doubling both of a pair quarters what it violates, so this ends.
 
+use machine::gcode::dialect::Space;
 use machine::profile::Printer;
 
 use crate::resample::Leg;
@@ -36,6 +37,10 @@ struct AxisLimit {
 /// rounding of `F`, and readers who measure an arc by its chord.
 const USED_SHARE: f64 = 0.99;
 
+/// The same where the firmware moves straight over the part: within a move the bed's speed then
+/// differs from its mean by up to a tenth.
+const USED_SHARE_UNEVEN: f64 = 0.9;
+
 /// Times that durations are gone over before the rest is left as it is. Each pass brings a change of
 /// speed one move further; 200 moves at 15° are eight turns of the bed.
 const MOST_PASSES: usize = 200;
@@ -57,12 +62,14 @@ impl Pace {
 }
 
 impl Limits {
-    /// Returns the limits of a printer; with `polar` false only lift and command rate count.
+    /// Returns the limits of a printer for moves that are straight in `space`; over the part, only
+    /// lift and command rate count.
     #[must_use]
-    pub fn of(printer: &Printer, polar: bool) -> Self {
+    pub fn of(printer: &Printer, space: Space) -> Self {
+        let share = if space == Space::IdealPlane { USED_SHARE_UNEVEN } else { USED_SHARE };
         let limit = |speed: f64, acceleration: f64| AxisLimit {
-            speed: speed * USED_SHARE,
-            acceleration: acceleration * USED_SHARE,
+            speed: speed * share,
+            acceleration: acceleration * share,
         };
         Self {
             axes: [
@@ -71,7 +78,7 @@ impl Limits {
             ],
             lift_speed: printer.lift.speed * USED_SHARE,
             least_duration: 1.0 / printer.moves_per_second,
-            polar,
+            polar: space != Space::Part,
         }
     }
 }
@@ -258,7 +265,7 @@ mod tests {
             .collect();
         let legs: Vec<Leg> = resampler.legs(&strokes).unwrap().into_iter().flatten().collect();
         let travels = travels(&legs, start);
-        let limits = Limits::of(&printer, true);
+        let limits = Limits::of(&printer, Space::Joints);
         let (durations, _) = durations(&legs, &travels, Pace::REST, &limits);
         (legs, travels, durations)
     }

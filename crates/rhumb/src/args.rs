@@ -97,9 +97,13 @@ pub struct SettingsArguments {
     /// Set one value; wins over all files (repeatable)
     #[arg(long, value_name = "KEY=VALUE", action = ArgAction::Append)]
     pub set: Vec<String>,
-    /// The words of the program: polar or cartesian
+    /// The words of the program: polar, rrf-direct, klipper-polar, rrf-polar, marlin-polar,
+    /// grblhal-polar or cartesian
     #[arg(long, value_name = "NAME")]
     pub dialect: Option<String>,
+    /// How this very machine misses the ideal one
+    #[arg(long, value_name = "CAL.toml")]
+    pub calibration: Option<PathBuf>,
 }
 
 impl SettingsArguments {

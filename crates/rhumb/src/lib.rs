@@ -32,6 +32,7 @@
 //! ```
 
 pub mod args;
+pub mod calibration;
 pub mod check;
 pub mod clock;
 pub mod commands;

@@ -113,7 +113,7 @@ pub fn slice(
     let upright = placed.solid.moved(|p| turned * p);
     let mut job = job.clone();
     job.plan.resample.azimuth = placed.azimuth;
-    let mut text = Emitter::new(out, job.dialect);
+    let mut text = Emitter::for_printer(out, job.dialect, &job.printer);
     program_text::head(&mut text, request.name, request.made_at, &job.start).map_err(written)?;
     let mut printed = layers(&upright, &stages, &job, &mut text, watch)?;
     layout.levels = std::mem::take(&mut printed.levels);
@@ -244,6 +244,7 @@ fn layers(
     }
     let (steps, totals) =
         planner.finish().map_err(|error| Failure::new("Bug", error.to_string()))?;
+    text.leave_part();
     write(text, &steps)?;
     printed.totals = totals;
     if printed.totals.extruded() <= 0.0 {

@@ -4,15 +4,22 @@
 //! what was announced, so memory does not grow with the program. Positions in joints go through
 //! the printer's *forward* kinematics; its inverse is never asked.
 //!
-//! `F` is the speed of the nozzle over the part in mm/min, so a move takes the length of its
-//! [curve](crate::curve) divided by it; where only filament moves `F` is the speed of the
-//! filament. `F`, the plane and `Z` hold until they are given again; `E` is relative. Words are
+//! What `F` means is the dialect's: the speed of the nozzle over the part, so that a move takes the
+//! length of its [curve](crate::curve) divided by it, the speed along the words, or inverse time;
+//! where only filament moves `F` is the speed of the filament. Where the firmware turns words into
+//! radius and angle itself, a line is taken as the spiral piece between its ends, from which it
+//! differs by less than the chord tolerance to which such lines are cut. The bed follows its drive
+//! through the play of the machine, and heights are above the bed as it was probed. `G92` sets the
+//! count of the bed. `F`, the plane and `Z` hold until they are given again; `E` is relative. Words are
 //! read as in absolute positions (`G90`) and relative filament (`M83`) whatever was commanded:
 //! that it was commanded is for [`crate::check::modes`]. `G28` brings the machine to the
 //! printer's home.
 
+use machine::backlash::LooseBed;
 use machine::gcode::dialect::{Dialect, Quantity, Space};
+use machine::gcode::speed_word::{SpeedWord, Way};
 use machine::gcode::{Command, Line, SyntaxError, parse_line};
+use machine::height_map::HeightMap;
 use machine::kinematics::Alignment;
 use machine::profile::Printer;
 use machine::program::{BedTurn, Feed, Joints, Role};
@@ -66,6 +73,8 @@ struct Stand {
     /// The plane's words, in their own units.
     plane: [f64; 2],
     z: f64,
+    /// Where the words bring the bed's drive.
+    drive: BedTurn,
     joints: Option<Joints>,
     part: Point3<f64>,
 }
@@ -74,11 +83,16 @@ struct Stand {
 #[derive(Debug, Clone)]
 pub struct Replay {
     alignment: Alignment,
+    bed_map: HeightMap,
+    bed: LooseBed,
     home: Joints,
     dialect: Dialect,
     line: usize,
     stand: Stand,
-    feed: Feed,
+    /// The number of the last `F`; 0 before the first.
+    speed_word: f64,
+    /// What was taken off the count of the bed, radians.
+    recounted: f64,
     layer: Option<usize>,
     top: Option<f64>,
     height: Option<f64>,
@@ -92,11 +106,14 @@ impl Replay {
     pub fn new(printer: &Printer, dialect: Dialect) -> Self {
         Self {
             alignment: printer.alignment,
+            bed_map: printer.bed_map.clone(),
+            bed: LooseBed::new(printer.alignment.bed.backlash, printer.home.turn),
             home: printer.home,
-            dialect,
+            dialect: dialect.on_bed(printer.rail.max),
             line: 0,
             stand: Stand::at_home(&printer.home, &dialect, &printer.alignment),
-            feed: Feed::mm_per_s(0.0),
+            speed_word: 0.0,
+            recounted: 0.0,
             layer: None,
             top: None,
             height: None,
@@ -153,7 +170,12 @@ impl Replay {
             Numbered(b'G', 0..=3, 0) => self.motion(command).map_or(Event::Nothing, Event::Segment),
             Numbered(b'G', 28, 0) => {
                 self.stand = Stand::at_home(&self.home, &self.dialect, &self.alignment);
+                self.recounted = 0.0;
                 Event::Rest
+            }
+            Numbered(b'G', 92, 0) => {
+                self.recount(command);
+                Event::Nothing
             }
             Numbered(b'G', 4, 0) | Numbered(b'M', 400, 0) => Event::Rest,
             Numbered(b'M', 104 | 109, 0) => {
@@ -166,9 +188,20 @@ impl Replay {
         }
     }
 
+    /// Sets the count of the bed without moving it, where the bed has a word of its own.
+    fn recount(&mut self, command: &Command<'_>) {
+        for (k, word) in self.dialect.plane.iter().enumerate() {
+            let Some(count) = command.word(word.letter) else { continue };
+            if word.quantity == Quantity::Bed {
+                self.recounted = self.stand.drive.radians() - count.to_radians();
+                self.stand.plane[k] = count;
+            }
+        }
+    }
+
     fn motion(&mut self, command: &Command<'_>) -> Option<Segment> {
-        if let Some(feed) = command.word(b'F').filter(|feed| *feed > 0.0) {
-            self.feed = Feed::from_word(feed);
+        if let Some(word) = command.word(b'F').filter(|word| *word > 0.0) {
+            self.speed_word = word;
         }
         let words = self.dialect.plane.map(|word| command.word(word.letter));
         let (z, filament) = (command.word(b'Z'), command.word(b'E'));
@@ -176,9 +209,27 @@ impl Replay {
         let moves = words[0].is_some() || words[1].is_some() || z.is_some();
         if moves {
             let plane = [0, 1].map(|k| words[k].unwrap_or(from.plane[k]));
-            self.stand = Stand::at(plane, z.unwrap_or(from.z), &self.dialect, &self.alignment);
+            self.stand = self.stand_at(plane, z.unwrap_or(from.z));
         }
         (moves || filament.is_some()).then(|| self.segment(&from, filament.unwrap_or(0.0)))
+    }
+
+    fn stand_at(&mut self, plane: [f64; 2], z: f64) -> Stand {
+        let mut words = plane;
+        for (word, value) in self.dialect.plane.iter().zip(&mut words) {
+            if word.quantity == Quantity::Bed {
+                *value += self.recounted.to_degrees();
+            }
+        }
+        let Some(told) = self.dialect.joints(words, z, self.stand.drive) else {
+            let over_bed = self.alignment.over_bed(&words.into());
+            let part = Point3::new(words[0], words[1], self.bed_map.part_z(&over_bed, z));
+            return Stand { plane, z, drive: self.stand.drive, joints: None, part };
+        };
+        let joints = Joints { turn: self.bed.drive(told.turn), ..told };
+        let mut part = self.alignment.part_from_joints(&joints);
+        part.z = self.bed_map.part_z(&self.alignment.over_bed(&part.xy()), z);
+        Stand { plane, z, drive: told.turn, joints: Some(joints), part }
     }
 
     fn segment(&self, from: &Stand, filament: f64) -> Segment {
@@ -190,7 +241,8 @@ impl Replay {
         };
         let path = curve.length();
         let distance = if path > 0.0 { path } else { filament.abs() };
-        let speed = self.feed.in_mm_per_s();
+        let duration = self.duration(from, path, filament);
+        let speed = if duration > 0.0 { distance / duration } else { 0.0 };
         Segment {
             line: self.line,
             layer: self.layer,
@@ -202,9 +254,28 @@ impl Replay {
             curve,
             path,
             filament,
-            feed: self.feed,
-            duration: if speed > 0.0 { distance / speed } else { 0.0 },
+            feed: match self.dialect.speed {
+                SpeedWord::Nozzle => Feed::from_word(self.speed_word),
+                _ => Feed::mm_per_s(speed),
+            },
+            duration,
         }
+    }
+
+    fn duration(&self, from: &Stand, path: f64, filament: f64) -> f64 {
+        if self.speed_word <= 0.0 {
+            return 0.0;
+        }
+        let to = &self.stand;
+        let [x, y] = [0, 1].map(|k| to.plane[k] - from.plane[k]);
+        let way = Way {
+            path,
+            words: x.hypot(y).hypot(to.z - from.z),
+            filament,
+            turn: to.drive.radians() - from.drive.radians(),
+            radius: to.joints.map_or(0.0, |joints| joints.s.abs()),
+        };
+        self.dialect.speed.duration(&way, self.speed_word)
     }
 
     fn comment(&mut self, comment: &str) -> Event {
@@ -230,34 +301,17 @@ impl Replay {
 impl Stand {
     fn at_home(home: &Joints, dialect: &Dialect, alignment: &Alignment) -> Self {
         let part = alignment.part_from_joints(home);
+        let (sin, cos) = home.turn.radians().sin_cos();
         let plane = dialect.plane.map(|word| match word.quantity {
             Quantity::Rail => home.s,
             Quantity::Bed => home.turn.radians().to_degrees(),
             Quantity::PartX => part.x,
             Quantity::PartY => part.y,
+            Quantity::IdealX => home.s * cos,
+            Quantity::IdealY => home.s * sin,
         });
-        let joints = (dialect.space == Space::Joints).then_some(*home);
-        Self { plane, z: home.z, joints, part }
-    }
-
-    fn at(plane: [f64; 2], z: f64, dialect: &Dialect, alignment: &Alignment) -> Self {
-        let mut joints = Joints { s: 0.0, turn: BedTurn::default(), z };
-        let mut part = Point3::new(0.0, 0.0, z);
-        for (word, value) in dialect.plane.iter().zip(plane) {
-            match word.quantity {
-                Quantity::Rail => joints.s = value,
-                Quantity::Bed => joints.turn = BedTurn::accumulated(value.to_radians()),
-                Quantity::PartX => part.x = value,
-                Quantity::PartY => part.y = value,
-            }
-        }
-        match dialect.space {
-            Space::Joints => {
-                let part = alignment.part_from_joints(&joints);
-                Self { plane, z, joints: Some(joints), part }
-            }
-            Space::Part => Self { plane, z, joints: None, part },
-        }
+        let joints = (dialect.space != Space::Part).then_some(*home);
+        Self { plane, z: home.z, drive: home.turn, joints, part }
     }
 }
 

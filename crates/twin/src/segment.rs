@@ -91,9 +91,13 @@ impl Segment {
         self.joints.map_or(0.0, |[from, to]| to.s - from.s)
     }
 
-    /// Returns how far the nozzle rises, mm.
+    /// Returns how far the lift rises, mm; on a bed that was probed not quite what the nozzle rises
+    /// over the part.
     #[must_use]
     pub fn lift_change(&self) -> f64 {
-        self.part[1].z - self.part[0].z
+        match self.joints {
+            Some([from, to]) => to.z - from.z,
+            None => self.part[1].z - self.part[0].z,
+        }
     }
 }

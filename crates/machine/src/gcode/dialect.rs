@@ -7,6 +7,7 @@
 use nalgebra::Point3;
 
 use super::number::{quantum, value};
+use super::speed_word::SpeedWord;
 use crate::program::{BedTurn, Joints, Move};
 
 /// In which coordinates a move between two lines of the program is straight.
@@ -16,6 +17,10 @@ pub enum Space {
     Joints,
     /// The nozzle runs straight over the part.
     Part,
+    /// The nozzle of an ideal polar printer would run straight: the firmware turns `x` and `y` into
+    /// radius and angle itself. A real machine's misalignment is in the words, which are therefore
+    /// not quite part coordinates.
+    IdealPlane,
 }
 
 /// What a word stands for.
@@ -29,6 +34,10 @@ pub enum Quantity {
     PartX,
     /// The y coordinate in the part, mm.
     PartY,
+    /// The x coordinate of the carriage's place on an ideal machine, mm.
+    IdealX,
+    /// Its y coordinate, mm.
+    IdealY,
 }
 
 /// One of the two words that say where in the plane a move ends.
@@ -41,7 +50,7 @@ pub struct Word {
 }
 
 /// How a firmware wants to be spoken to. See the [module](self).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dialect {
     /// What users call it.
     pub name: &'static str,
@@ -49,6 +58,11 @@ pub struct Dialect {
     pub space: Space,
     /// The two words of the plane, always written together.
     pub plane: [Word; 2],
+    /// What `F` means.
+    pub speed: SpeedWord,
+    /// Turn of the bed, in degrees, beyond which the count begins again (`G92`) at the next layer:
+    /// where the firmware keeps it in single precision, whose last place grows with it.
+    pub recount_beyond: Option<f64>,
 }
 
 /// `R` and `T`: the firmware moves carriage and bed as it is told; `F` is the speed of the nozzle
@@ -60,7 +74,45 @@ pub const POLAR: Dialect = Dialect {
         Word { letter: b'R', quantity: Quantity::Rail },
         Word { letter: b'T', quantity: Quantity::Bed },
     ],
+    speed: SpeedWord::Nozzle,
+    recount_beyond: None,
 };
+
+/// `X` along the rail, `C` in degrees, every move with its time (`G93`): `RepRapFirmware`,
+/// grblHAL and `LinuxCNC` with a rotary axis.
+pub const RRF_DIRECT: Dialect = Dialect {
+    name: "rrf-direct",
+    space: Space::Joints,
+    plane: [
+        Word { letter: b'X', quantity: Quantity::Rail },
+        Word { letter: b'C', quantity: Quantity::Bed },
+    ],
+    speed: SpeedWord::InverseTime,
+    // The last place of a single-precision number is 0.002° from here on; 90 turns take longer
+    // than a layer, so it never gets much worse.
+    recount_beyond: Some(32_768.0),
+};
+
+/// Klipper with `kinematics: polar`.
+pub const KLIPPER_POLAR: Dialect = ideal_plane("klipper-polar", SpeedWord::Words);
+
+/// `RepRapFirmware` with `M669 K7`.
+pub const RRF_POLAR: Dialect = ideal_plane("rrf-polar", SpeedWord::Words);
+
+/// Marlin with `POLAR`.
+pub const MARLIN_POLAR: Dialect =
+    ideal_plane("marlin-polar", SpeedWord::MarlinPolar { printable_radius: 82.0 });
+
+/// grblHAL with `POLAR_ROBOT`.
+pub const GRBLHAL_POLAR: Dialect = ideal_plane("grblhal-polar", SpeedWord::Words);
+
+const fn ideal_plane(name: &'static str, speed: SpeedWord) -> Dialect {
+    let plane = [
+        Word { letter: b'X', quantity: Quantity::IdealX },
+        Word { letter: b'Y', quantity: Quantity::IdealY },
+    ];
+    Dialect { name, space: Space::IdealPlane, plane, speed, recount_beyond: None }
+}
 
 /// `X` and `Y` in the part: for viewers, and for printers that are not polar.
 pub const CARTESIAN: Dialect = Dialect {
@@ -70,16 +122,55 @@ pub const CARTESIAN: Dialect = Dialect {
         Word { letter: b'X', quantity: Quantity::PartX },
         Word { letter: b'Y', quantity: Quantity::PartY },
     ],
+    speed: SpeedWord::Nozzle,
+    recount_beyond: None,
 };
 
 /// All dialects, the default one first.
-pub const ALL: [Dialect; 2] = [POLAR, CARTESIAN];
+pub const ALL: [Dialect; 7] =
+    [POLAR, RRF_DIRECT, KLIPPER_POLAR, RRF_POLAR, MARLIN_POLAR, GRBLHAL_POLAR, CARTESIAN];
 
 impl Dialect {
     /// Returns the dialect that users call `name`.
     #[must_use]
     pub fn by_name(name: &str) -> Option<Self> {
         ALL.into_iter().find(|dialect| dialect.name == name)
+    }
+
+    /// Returns the dialect as a firmware set up for a bed of this radius (mm) speaks it.
+    #[must_use]
+    pub fn on_bed(mut self, radius: f64) -> Self {
+        if let SpeedWord::MarlinPolar { printable_radius } = &mut self.speed {
+            *printable_radius = radius;
+        }
+        self
+    }
+
+    /// Returns whether `G92` may set the count of this word: the bed's, where it is kept short.
+    #[must_use]
+    pub fn recounts(&self, letter: u8) -> bool {
+        let is_bed = |word: &Word| word.quantity == Quantity::Bed && word.letter == letter;
+        self.recount_beyond.is_some() && self.plane.iter().any(is_bed)
+    }
+
+    /// Returns whether the words can bring the carriage to the other side of the axis.
+    #[must_use]
+    pub fn reaches_far_side(&self) -> bool {
+        self.space == Space::Joints
+    }
+
+    /// Returns where the joints are when a share of the way from one position to another is done.
+    #[must_use]
+    pub fn between(&self, from: &Joints, to: &Joints, share: f64) -> Joints {
+        let blend = |a: f64, b: f64| a + (b - a) * share;
+        let z = blend(from.z, to.z);
+        if self.space == Space::IdealPlane {
+            let (a, b) = (ideal(from), ideal(to));
+            let (x, y) = (blend(a[0], b[0]), blend(a[1], b[1]));
+            return from_ideal([x, y], z, from.turn);
+        }
+        let turn = blend(from.turn.radians(), to.turn.radians());
+        Joints { s: blend(from.s, to.s), turn: BedTurn::accumulated(turn), z }
     }
 
     /// Returns the numbers of the plane's words for the end of a move.
@@ -90,18 +181,22 @@ impl Dialect {
             Quantity::Bed => to.turn.radians().to_degrees(),
             Quantity::PartX => at.x,
             Quantity::PartY => at.y,
+            Quantity::IdealX => ideal(to)[0],
+            Quantity::IdealY => ideal(to)[1],
         })
     }
 
-    /// Returns the joints that a position in this dialect's words stands for; `None` when the
-    /// words are part coordinates.
+    /// Returns the joints that a position in this dialect's words stands for, the bed turned as
+    /// little as possible from `near` where the words do not say; `None` when they are part
+    /// coordinates.
     #[must_use]
-    pub fn joints(&self, plane: [f64; 2], z: f64) -> Option<Joints> {
-        match self.plane.map(|word| word.quantity) {
-            [Quantity::Rail, Quantity::Bed] => {
+    pub fn joints(&self, plane: [f64; 2], z: f64, near: BedTurn) -> Option<Joints> {
+        match self.space {
+            Space::Joints => {
                 Some(Joints { s: plane[0], turn: BedTurn::accumulated(plane[1].to_radians()), z })
             }
-            _ => None,
+            Space::IdealPlane => Some(from_ideal(plane, z, near)),
+            Space::Part => None,
         }
     }
 
@@ -109,12 +204,13 @@ impl Dialect {
     #[must_use]
     pub fn rounded_joints(&self, to: &Joints) -> Joints {
         let lengths = self.length_decimals(to.s.abs());
-        let degrees = rounded(to.turn.radians().to_degrees(), DEGREE_DECIMALS);
-        Joints {
-            s: rounded(to.s, lengths),
-            turn: BedTurn::accumulated(degrees.to_radians()),
-            z: rounded(to.z, MM_DECIMALS),
+        let z = rounded(to.z, MM_DECIMALS);
+        if self.space == Space::IdealPlane {
+            return from_ideal(ideal(to).map(|n| rounded(n, lengths)), z, to.turn);
         }
+        let degrees = rounded(to.turn.radians().to_degrees(), DEGREE_DECIMALS);
+        let turn = BedTurn::accumulated(degrees.to_radians());
+        Joints { s: rounded(to.s, lengths), turn, z }
     }
 
     /// Returns a point of the part as a program in this dialect's words will say it.
@@ -127,7 +223,7 @@ impl Dialect {
     /// Decimal places of the plane's words at the end of a move.
     pub(super) fn decimals(&self, step: &Move) -> [usize; 2] {
         let lengths = self.length_decimals(match self.space {
-            Space::Joints => step.to.s.abs(),
+            Space::Joints | Space::IdealPlane => step.to.s.abs(),
             Space::Part => step.at.xy().coords.norm(),
         });
         self.plane
@@ -139,6 +235,17 @@ impl Dialect {
     fn length_decimals(&self, from_axis: f64) -> usize {
         if from_axis < NEAR_AXIS_MM { NEAR_AXIS_DECIMALS } else { MM_DECIMALS }
     }
+}
+
+/// The place of the carriage on an ideal machine that counts its turn from +x.
+fn ideal(joints: &Joints) -> [f64; 2] {
+    let (sin, cos) = joints.turn.radians().sin_cos();
+    [joints.s * cos, joints.s * sin]
+}
+
+fn from_ideal([x, y]: [f64; 2], z: f64, near: BedTurn) -> Joints {
+    let turn = if x == 0.0 && y == 0.0 { near } else { near.nearest(y.atan2(x)) };
+    Joints { s: x.hypot(y), turn, z }
 }
 
 fn rounded(number: f64, decimals: usize) -> f64 {

@@ -7,9 +7,12 @@
 
 use std::io::{self, Write};
 
-use super::dialect::{Dialect, MM_DECIMALS, NEAR_AXIS_DECIMALS};
+use super::correction::Correction;
+use super::dialect::{DEGREE_DECIMALS, Dialect, MM_DECIMALS, NEAR_AXIS_DECIMALS, Quantity};
 use super::number::{decimal, push_quantum, quantum, value};
-use crate::program::{Layer, Move, Role, Step};
+use super::speed_word::Way;
+use crate::profile::Printer;
+use crate::program::{BedTurn, Joints, Layer, Move, Role, Step};
 
 /// Longest line, in characters. Marlin's command buffer holds 96.
 pub const MOST_COLUMNS: usize = 90;
@@ -20,13 +23,28 @@ const FILAMENT_DECIMALS: usize = 5;
 /// Decimal places of `F`.
 const FEED_DECIMALS: usize = 1;
 
+/// Decimal places of small inverse times: 0.0001/min is 0.1 % for a move of ten minutes.
+const INVERSE_TIME_DECIMALS: usize = 4;
+
+const DEGREES_IN_A_TURN: f64 = 360.0;
+
 /// Writes the steps of a program to `W` in the words of a dialect.
 pub struct Emitter<W> {
     out: W,
     dialect: Dialect,
     line: Vec<u8>,
+    correction: Option<Correction>,
     /// The last plane words and z written, in units of the finest last place.
     position: Option<[i64; 3]>,
+    /// Where the bed was told to turn last.
+    turn: Option<BedTurn>,
+    /// Whole turns that the firmware's count is behind.
+    recounted: f64,
+    /// Whether the part is done and what follows only leaves it.
+    leaves: bool,
+    /// Whether the firmware now takes `F` as inverse time.
+    inverse_time: bool,
+    /// The last speed word, in units of its last place.
     feed: i64,
     /// Filament that rounding has kept back so far, mm.
     filament_owed: f64,
@@ -41,12 +59,24 @@ impl<W: Write> Emitter<W> {
             out,
             dialect,
             line: Vec::with_capacity(MOST_COLUMNS),
+            correction: None,
             position: None,
+            turn: None,
+            recounted: 0.0,
+            leaves: false,
+            inverse_time: false,
             feed: 0,
             filament_owed: 0.0,
             bead: None,
             lines: 0,
         }
+    }
+
+    /// Returns an emitter for a printer that stands at home, whose bed heights and play are
+    /// corrected for.
+    pub fn for_printer(out: W, dialect: Dialect, printer: &Printer) -> Self {
+        let dialect = dialect.on_bed(printer.rail.max);
+        Self { correction: Correction::of(printer, dialect), ..Self::new(out, dialect) }
     }
 
     /// Writes one step.
@@ -56,12 +86,12 @@ impl<W: Write> Emitter<W> {
     /// What the writer reports.
     pub fn step(&mut self, step: &Step) -> io::Result<()> {
         match step {
-            Step::Move(motion) => self.motion(motion),
+            Step::Move(motion) => self.planned(motion),
             Step::Layer(layer) => self.layer(layer),
             Step::Bead(role, width) => self.bead(*role, *width),
             Step::Fan(share) => self.fan(*share),
             Step::Remark(text) => self.comment(text),
-            Step::Custom(line) => self.text(line),
+            Step::Custom(line) => self.custom(line),
         }
     }
 
@@ -85,6 +115,12 @@ impl<W: Write> Emitter<W> {
         self.end_line()
     }
 
+    /// Says that the part is done: heights from here on are not its own, and are marked (`;E`) so
+    /// that `RepRapFirmware` does not take them for the height of the part.
+    pub fn leave_part(&mut self) {
+        self.leaves = true;
+    }
+
     /// Returns the number of lines written.
     #[must_use]
     pub fn lines(&self) -> usize {
@@ -101,9 +137,27 @@ impl<W: Write> Emitter<W> {
         Ok(self.out)
     }
 
+    fn planned(&mut self, motion: &Move) -> io::Result<()> {
+        let Some(correction) = &mut self.correction else { return self.motion(motion) };
+        let (take_up, told) = correction.moves(motion);
+        if let Some(take_up) = take_up {
+            self.motion(&take_up)?;
+        }
+        self.motion(&told)
+    }
+
+    /// A line of the printer's owner, who knows nothing of inverse time.
+    fn custom(&mut self, line: &str) -> io::Result<()> {
+        if self.inverse_time && line.trim_start().starts_with(['G', 'g']) {
+            self.inverse_time = false;
+            self.text("G94")?;
+        }
+        self.text(line)
+    }
+
     fn motion(&mut self, motion: &Move) -> io::Result<()> {
         let decimals = self.dialect.decimals(motion);
-        let plane = self.dialect.plane_values(&motion.to, &motion.at);
+        let plane = self.plane_words(&motion.to, motion);
         let counts = [quantum(plane[0], decimals[0]), quantum(plane[1], decimals[1])];
         let finest = |k: usize| counts[k] * 10_i64.pow((NEAR_AXIS_DECIMALS - decimals[k]) as u32);
         let z = quantum(motion.to.z, MM_DECIMALS);
@@ -117,6 +171,10 @@ impl<W: Write> Emitter<W> {
         let z_moved = moved(2);
         if !plane_moved && !z_moved && filament == 0 {
             return Ok(());
+        }
+        if self.dialect.speed.is_of_one_move() && !self.inverse_time {
+            self.inverse_time = true;
+            self.text("G93")?;
         }
         self.line.extend_from_slice(b"G1");
         if plane_moved {
@@ -133,21 +191,90 @@ impl<W: Write> Emitter<W> {
             self.line.extend_from_slice(b" E");
             push_quantum(&mut self.line, filament, FILAMENT_DECIMALS);
         }
-        // Rounded down, so that a limit stays a limit; never to nothing. What is a whole number but
-        // for its last bits stays one.
-        let feed = (motion.feed().word() * 10.0 + 1e-3).floor().max(1.0) as i64;
-        if feed != self.feed {
-            self.line.extend_from_slice(b" F");
-            push_quantum(&mut self.line, feed, FEED_DECIMALS);
-            self.feed = feed;
+        self.speed(motion, target, plane_moved);
+        if z_moved && self.leaves {
+            self.line.extend_from_slice(b" ;E");
         }
         if plane_moved {
             self.position = Some(target);
+            self.turn = Some(motion.to.turn);
         } else if let Some(position) = &mut self.position {
             position[2] = z;
         } else {
             // Nothing is known of the plane yet: no later move may take it for granted.
             self.position = Some([i64::MIN, i64::MIN, z]);
+        }
+        self.end_line()
+    }
+
+    fn plane_words(&self, to: &Joints, motion: &Move) -> [f64; 2] {
+        let mut words = self.dialect.plane_values(to, &motion.at);
+        for (word, value) in self.dialect.plane.iter().zip(&mut words) {
+            if word.quantity == Quantity::Bed {
+                *value -= self.recounted * DEGREES_IN_A_TURN;
+            }
+        }
+        words
+    }
+
+    /// Appends the speed word, where it is not still the same.
+    fn speed(&mut self, motion: &Move, target: [i64; 3], plane_moved: bool) {
+        let known = self.position.filter(|last| last[0] != i64::MIN);
+        let apart = |k: usize| known.map(|last| value(target[k] - last[k], NEAR_AXIS_DECIMALS));
+        let across = match (plane_moved, apart(0), apart(1)) {
+            (true, Some(x), Some(y)) => Some(x.hypot(y)),
+            (true, ..) => None,
+            (false, ..) => Some(0.0),
+        };
+        let rise = self.position.map_or(0.0, |last| value(target[2] - last[2], MM_DECIMALS));
+        let turn = self.turn.map_or(0.0, |last| motion.to.turn.radians() - last.radians());
+        let way = Way {
+            path: motion.path,
+            // Where nothing is known of the begin the planned path is the best guess.
+            words: across.map_or(motion.path, |across| across.hypot(rise)),
+            filament: motion.filament,
+            turn: if plane_moved { turn } else { 0.0 },
+            radius: motion.to.s.abs(),
+        };
+        let word = self.dialect.speed.word(&way, motion.duration);
+        // A tenth of mm/min is fine for speeds; inverse times of long moves are small numbers.
+        let decimals = if self.dialect.speed.is_of_one_move() && word < 600.0 {
+            INVERSE_TIME_DECIMALS
+        } else {
+            FEED_DECIMALS
+        };
+        // Rounded down, so that a limit stays a limit; never to nothing. What is a whole number but
+        // for its last bits stays one.
+        let scale = 10_f64.powi(decimals as i32);
+        let feed = (word * scale + 1e-3).floor().max(1.0) as i64;
+        if feed != self.feed || self.dialect.speed.is_of_one_move() {
+            self.line.extend_from_slice(b" F");
+            push_quantum(&mut self.line, feed, decimals);
+            self.feed = feed;
+        }
+    }
+
+    /// Sets the count of the bed back by whole turns where it has grown too large for the firmware.
+    fn recount(&mut self) -> io::Result<()> {
+        let (Some(beyond), Some(turn)) = (self.dialect.recount_beyond, self.turn) else {
+            return Ok(());
+        };
+        let degrees = turn.radians().to_degrees();
+        if (degrees - self.recounted * DEGREES_IN_A_TURN).abs() <= beyond {
+            return Ok(());
+        }
+        self.recounted = (degrees / DEGREES_IN_A_TURN).floor();
+        let left = quantum(degrees - self.recounted * DEGREES_IN_A_TURN, DEGREE_DECIMALS);
+        self.line.extend_from_slice(b"G92");
+        for (k, word) in self.dialect.plane.iter().enumerate() {
+            if word.quantity == Quantity::Bed {
+                self.line.extend_from_slice(&[b' ', word.letter]);
+                push_quantum(&mut self.line, left, DEGREE_DECIMALS);
+                if let Some(position) = &mut self.position {
+                    let places = (NEAR_AXIS_DECIMALS - DEGREE_DECIMALS) as u32;
+                    position[k] = left * 10_i64.pow(places);
+                }
+            }
         }
         self.end_line()
     }
@@ -163,7 +290,7 @@ impl<W: Write> Emitter<W> {
             self.text(&format!(";{top}"))?;
         }
         self.bead = None;
-        Ok(())
+        self.recount()
     }
 
     fn bead(&mut self, role: Role, width: f64) -> io::Result<()> {

@@ -1,9 +1,11 @@
 //! Programs as text: writing, reading, and the words of each firmware.
 
+mod correction;
 pub mod dialect;
 mod emit;
 mod number;
 mod parse;
+pub mod speed_word;
 
 pub use dialect::Dialect;
 pub use emit::{Emitter, MOST_COLUMNS, printable};

@@ -12,6 +12,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use crate::args::{Arguments, Command, PlaceArguments, SettingsArguments};
+use crate::calibration::Calibration;
 use crate::failure::Failure;
 use crate::input;
 use crate::output::{self, Output};
@@ -68,7 +69,11 @@ fn write_file(target: &Path, inputs: &[&Path], bytes: &[u8]) -> Result<(), Failu
 
 fn settings(arguments: &SettingsArguments) -> Result<(Settings, Job), Failure> {
     let settings = Settings::load(&arguments.sources(), &input::read)?;
-    let job = Job::resolve(&settings)?;
+    let mut job = Job::resolve(&settings)?;
+    if let Some(path) = &arguments.calibration {
+        let calibration = Calibration::read(&input::read(path)?, &display_name(path))?;
+        calibration.apply(&mut job.printer, job.bed_map_fade)?;
+    }
     Ok((settings, job))
 }
 

@@ -8,6 +8,7 @@ use twin::verify::Verdict;
 
 use super::{DONE, LOOK, display_name, say, say_json, settings, to_json, wish};
 use crate::args::{Manner, Slice};
+use crate::calibration;
 use crate::check::{check, refusal};
 use crate::clock;
 use crate::failure::Failure;
@@ -53,7 +54,8 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
             made_at: &clock::now(),
         };
         let watch = &mut Watch { progress: &mut *progress, interrupt: &interrupt };
-        let outcome = pipeline::slice(&request, &mut text, watch)?;
+        let mut outcome = pipeline::slice(&request, &mut text, watch)?;
+        outcome.warnings.extend(calibration::warning(&job.printer));
         text.flush().map_err(|error| output::failed(&target, &error))?;
         outcome
     };

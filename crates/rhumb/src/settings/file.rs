@@ -244,7 +244,7 @@ mod tests {
             ("layer_height_mm 0.2", "ConfigSyntax"),
             ("perimeters = 2\nperimeters = 3", "ConfigSyntax"),
             ("layer_heigth_mm = 0.2", "ConfigUnknownKey"),
-            ("[layers]\nheight = 0.2", "ConfigUnknownKey"),
+            ("[walls]\nheight = 0.2", "ConfigUnknownKey"),
             ("rail_max_mm = 100", "ConfigUnknownKey"),
             ("layer_height_mm = \"0.2\"", "ConfigType"),
             ("layer_height_mm = true", "ConfigType"),

@@ -230,12 +230,22 @@ const fn text(
 
 use Section::{Material, Print, Printer};
 
+const DIALECTS: &[&str] = &[
+    "polar",
+    "rrf-direct",
+    "klipper-polar",
+    "rrf-polar",
+    "marlin-polar",
+    "grblhal-polar",
+    "cartesian",
+];
+
 const PATTERNS: &[&str] = &["rectilinear", "grid", "concentric", "archimedeanchords"];
 
 /// All settings, by section, in the order in which they are shown.
 pub const KEYS: &[Key] = &[
     text(Printer, "printer_model", "printer_model", "generic-polar", "what the machine is called"),
-    choice(Printer, "dialect", &["polar", "cartesian"], "the words in which it wants its program"),
+    choice(Printer, "dialect", DIALECTS, "the words in which it wants its program"),
     number(
         Printer,
         "rail_min_mm",

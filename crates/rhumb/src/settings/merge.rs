@@ -50,6 +50,36 @@ pub const BUILT_IN: &[BuiltIn] = &[
         text: include_str!("../../profiles/generic-polar.toml"),
     },
     BuiltIn {
+        name: "klipper-polar",
+        section: Section::Printer,
+        text: include_str!("../../profiles/klipper-polar.toml"),
+    },
+    BuiltIn {
+        name: "rrf-polar",
+        section: Section::Printer,
+        text: include_str!("../../profiles/rrf-polar.toml"),
+    },
+    BuiltIn {
+        name: "marlin-polar",
+        section: Section::Printer,
+        text: include_str!("../../profiles/marlin-polar.toml"),
+    },
+    BuiltIn {
+        name: "grblhal-polar",
+        section: Section::Printer,
+        text: include_str!("../../profiles/grblhal-polar.toml"),
+    },
+    BuiltIn {
+        name: "core-r-theta",
+        section: Section::Printer,
+        text: include_str!("../../profiles/core-r-theta.toml"),
+    },
+    BuiltIn {
+        name: "linuxcnc-rotary",
+        section: Section::Printer,
+        text: include_str!("../../profiles/linuxcnc-rotary.toml"),
+    },
+    BuiltIn {
         name: "pla",
         section: Section::Material,
         text: include_str!("../../profiles/pla.toml"),
@@ -241,6 +271,10 @@ mod tests {
         assert_eq!(shown(&settings, "layer_height_mm"), "0.2 (built-in 0.2)");
         for profile in BUILT_IN {
             file::read(profile.text.as_bytes(), profile.name, profile.section).unwrap();
+        }
+        for profile in BUILT_IN.iter().filter(|profile| profile.section == Section::Printer) {
+            let sources = Sources { printer: Some(profile.name.into()), ..Sources::default() };
+            crate::settings::Job::resolve(&load(&sources, &[]).unwrap()).unwrap();
         }
         let fine = Sources { print: Some("0.12".into()), ..Sources::default() };
         let fine = load(&fine, &[]).unwrap();

@@ -2,6 +2,7 @@
 
 use geom::tolerance::Tolerances;
 use machine::gcode::Dialect;
+use machine::gcode::dialect::Space;
 use machine::height_map::HeightMap;
 use machine::kinematics::{Alignment, BedScale};
 use machine::profile::{Axis, Printer, Turntable};
@@ -54,6 +55,8 @@ pub struct Job {
     pub plan: PlanParams,
     /// Grams in a mm³ of filament.
     pub density_g_per_mm3: f64,
+    /// Height at which a probed bed is no longer corrected for, mm.
+    pub bed_map_fade: f64,
     /// Program before the print.
     pub start: Vec<String>,
     /// Program after the print.
@@ -68,9 +71,11 @@ impl Job {
     /// `ConfigRange` or `ConfigConflict` for values that do not fit together.
     pub fn resolve(settings: &Settings) -> Result<Self, Failure> {
         let get = Lookup(settings);
-        let printer = printer(&get);
+        let mut printer = printer(&get);
         let dialect = Dialect::by_name(get.text("dialect"))
-            .ok_or_else(|| conflict("there is no such dialect", get.text("dialect")))?;
+            .ok_or_else(|| conflict("there is no such dialect", get.text("dialect")))?
+            .on_bed(printer.rail.max);
+        suit(&mut printer, &dialect)?;
         let tolerances = Tolerances::new(get.number("simplify_mm"), get.number("chord_mm"))
             .map_err(|error| Failure::new("ConfigConflict", error.to_string()))?;
         check_printer(&printer)?;
@@ -91,6 +96,7 @@ impl Job {
             paths: paths(&get, &printer, &tolerances),
             plan: plan(&get, dialect, &tolerances),
             density_g_per_mm3: get.number("filament_density_g_per_cm3") / 1000.0,
+            bed_map_fade: get.number("bed_map_fade_mm"),
             start: template::fill(get.text("start_gcode"), "start_gcode", settings)?,
             end: template::fill(get.text("end_gcode"), "end_gcode", settings)?,
             printer,
@@ -153,6 +159,22 @@ fn printer(get: &Lookup<'_>) -> Printer {
         bed_map: HeightMap::default(),
         most_turn: most_turn(get.number("turns_max")),
     }
+}
+
+/// Takes from a printer what its firmware cannot use.
+fn suit(printer: &mut Printer, dialect: &Dialect) -> Result<(), Failure> {
+    if dialect.space != Space::IdealPlane {
+        return Ok(());
+    }
+    // A radius is never negative, wherever the rail may reach.
+    printer.rail.min = printer.rail.min.max(0.0);
+    if printer.most_turn.is_finite() {
+        return Err(conflict(
+            "turns_max cannot be kept where the firmware turns the bed",
+            dialect.name,
+        ));
+    }
+    Ok(())
 }
 
 /// Bound of the bed's turn, radians; 0 turns stand for none.

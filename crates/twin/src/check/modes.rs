@@ -31,7 +31,7 @@ impl Modes {
             Code::Numbered(b'M', 82, 0) => self.relative_filament = false,
             Code::Numbered(b'G', 0..=3, 0) => {
                 self.has_speed |= command.word(b'F').is_some();
-                let moves = b"RTXYZE".iter().any(|letter| command.word(*letter).is_some());
+                let moves = b"RTXYCZE".iter().any(|letter| command.word(*letter).is_some());
                 if moves {
                     self.motion(place, findings);
                 }

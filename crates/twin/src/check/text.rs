@@ -21,7 +21,7 @@ pub const NAME: &str = "text";
 pub const FILAMENT_ALONE: f64 = 50.0;
 
 /// The `G` commands that a program may have besides `G1`.
-const GENERAL: [u32; 5] = [4, 21, 28, 90, 92];
+const GENERAL: [u32; 7] = [4, 21, 28, 90, 92, 93, 94];
 
 /// The `M` commands that a program may have: extruder relative (83), motors off (18, 84), heaters
 /// and fans, progress and messages (73, 117), waiting for moves to end (400).
@@ -80,7 +80,7 @@ impl Text {
                     format!("motion by G{number}, which firmwares run differently; only G1 is safe")
                 });
             }
-            Code::Numbered(b'G', 92, 0) => origin(command, place, findings),
+            Code::Numbered(b'G', 92, 0) => self.origin(command, place, findings),
             Code::Numbered(b'G', number, 0) if GENERAL.contains(&number) => {}
             Code::Numbered(b'M', number, 0) if MACHINE.contains(&number) => {}
             Code::Numbered(letter, number, part) => {
@@ -93,6 +93,24 @@ impl Text {
             Code::Named(name) => findings.warning(NAME, place, (1.0, 0.0), || {
                 format!("what the macro {} does cannot be judged", printable(name))
             }),
+        }
+    }
+
+    /// Judges a new origin: of the filament, or of the bed's count where the dialect keeps it short.
+    fn origin(&self, command: &Command<'_>, place: Place, findings: &mut Findings) {
+        let given = |letter: &u8| command.word(*letter).is_some() && *letter != b'G';
+        let (mut recounts, mut others) = (false, false);
+        for letter in (b'A'..=b'Z').filter(given) {
+            if self.dialect.recounts(letter) {
+                recounts = true;
+            } else {
+                others |= letter != b'E' || command.word(b'E') != Some(0.0);
+            }
+        }
+        if others || !(recounts || command.word(b'E').is_some()) {
+            findings.error(NAME, place, (1.0, 0.0), || {
+                "G92 may only be G92 E0: anything else moves the origin of the program".into()
+            });
         }
     }
 
@@ -199,17 +217,6 @@ fn fault_of_number(number: &[u8]) -> Option<&'static str> {
         return Some("is not a plain decimal number");
     }
     (is_negative && is_zero).then_some("is a negative zero")
-}
-
-/// `G92` may only say that the filament stands at zero.
-fn origin(command: &Command<'_>, place: Place, findings: &mut Findings) {
-    let others = (b'A'..=b'Z').filter(|&letter| letter != b'E' && letter != b'G');
-    let moves_origin = others.into_iter().any(|letter| command.word(letter).is_some());
-    if moves_origin || command.word(b'E') != Some(0.0) {
-        findings.error(NAME, place, (1.0, 0.0), || {
-            "G92 may only be G92 E0: anything else moves the origin of the program".into()
-        });
-    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,208 @@
+//! What comes out of real machines: misaligned ones, and those of every dialect.
+
+use machine::kinematics::Alignment;
+use machine::profile::Printer;
+use machine::program::Role;
+use mesh::mesh::Mesh;
+use mesh::shapes;
+use nalgebra::{Point2, Vector2};
+use rhumb::check::check;
+use rhumb::interrupt::Interrupt;
+use rhumb::pipeline::{Request, Watch, part, slice};
+use rhumb::place::Wish;
+use rhumb::progress::Silent;
+use rhumb::settings::{Job, Settings, Sources};
+use twin::finding::Severity;
+use twin::segment::Segment;
+
+fn job(printer: &str, set: &[&str]) -> (Settings, Job) {
+    let sources = Sources {
+        printer: Some(printer.into()),
+        set: set.iter().map(|&pair| pair.to_owned()).collect(),
+        ..Sources::default()
+    };
+    let no_files = |_: &std::path::Path| unreachable!("built-in profiles need no files");
+    let settings = Settings::load(&sources, &no_files).expect("built-in profiles are sound");
+    let job = Job::resolve(&settings).expect("they fit together");
+    (settings, job)
+}
+
+/// Slices a mesh, and has the program judged by the machine that it was made for.
+fn program(mesh: &Mesh, settings: &Settings, job: &Job) -> Vec<u8> {
+    let model = mesh::stl::write(mesh);
+    let request = Request {
+        model: &model,
+        name: "test",
+        wish: Wish::default(),
+        settings,
+        job,
+        made_at: "2026-01-31 at 12:00:00",
+    };
+    let mut text = Vec::new();
+    let watch = &mut Watch { progress: &mut Silent, interrupt: &Interrupt::default() };
+    let outcome = slice(&request, &mut text, watch).expect("it can be sliced");
+    let verdict = check(text.as_slice(), job, Some(part(&outcome)), |_| {}).expect("memory");
+    let errors: Vec<_> =
+        verdict.findings.iter().filter(|f| f.severity == Severity::Error).take(3).collect();
+    assert!(errors.is_empty(), "{}: {errors:?}", job.dialect.name);
+    text
+}
+
+/// Places of the nozzle in the part, a few on each extruding move of the outer wall, as a machine
+/// prints them.
+fn outer_wall(text: &[u8], job: &Job, machine: &Printer) -> Vec<Point2<f64>> {
+    let job = Job { printer: machine.clone(), ..job.clone() };
+    let mut places = Vec::new();
+    let each = |segment: &Segment| {
+        if segment.extrudes() && segment.role == Role::ExternalPerimeter {
+            for k in 0..=4 {
+                let over_bed = segment.curve.over_bed(f64::from(k) / 4.0);
+                places.push(machine.alignment.part_from_bed(&over_bed));
+            }
+        }
+    };
+    check(text, &job, None, each).expect("memory");
+    assert!(places.len() > 100);
+    places
+}
+
+const MISSED: Alignment = Alignment { b: 0.5, ..Alignment::IDEAL };
+
+/// The chord tolerance and the last place of a length.
+const WITHIN: f64 = 0.005 + 0.001;
+
+fn square_tube() -> Mesh {
+    shapes::block(40.0, 40.0, 1.0)
+}
+
+fn boss() -> Mesh {
+    let ring: Vec<[f64; 2]> = (0..360)
+        .map(|k| f64::from(k).to_radians())
+        .map(|angle| [2.5 * angle.cos(), 2.5 * angle.sin()])
+        .collect();
+    shapes::extruded(&ring, &[], 1.0)
+}
+
+/// Distance from the square on which the outer wall's middle runs.
+fn off_square(p: &Point2<f64>, half: f64) -> f64 {
+    (p.x.abs().max(p.y.abs()) - half).abs()
+}
+
+#[test]
+fn a_calibrated_square_is_true_on_a_machine_that_misses_its_axis() {
+    for name in ["generic-polar", "klipper-polar", "core-r-theta"] {
+        let set = ["fill_density=0", "top_solid_layers=0", "bottom_solid_layers=0", "skirts=0"];
+        let (settings, mut job) = job(name, &set);
+        let half = 20.0 - 0.45 / 2.0;
+        let naive = program(&square_tube(), &settings, &job);
+        let mut real = job.printer.clone();
+        real.alignment = MISSED;
+        // What the theory predicts without correction: half a millimetre everywhere.
+        let (meant, printed) =
+            (outer_wall(&naive, &job, &job.printer), outer_wall(&naive, &job, &real));
+        for (a, b) in meant.iter().zip(&printed) {
+            assert!(((a - b).norm() - 0.5).abs() < 1e-9);
+        }
+        let worst =
+            |places: &[Point2<f64>]| places.iter().map(|p| off_square(p, half)).fold(0.0, f64::max);
+        assert!(worst(&printed) > 0.3, "{name}");
+        job.printer.alignment = MISSED;
+        let corrected = program(&square_tube(), &settings, &job);
+        let off = worst(&outer_wall(&corrected, &job, &real));
+        assert!(off <= WITHIN, "{name}: {off}");
+    }
+}
+
+#[test]
+fn a_calibrated_boss_has_its_radius() {
+    let set = ["fill_density=0", "top_solid_layers=0", "bottom_solid_layers=0", "perimeters=1"];
+    let (settings, mut job) = job("generic-polar", &set);
+    let mut real = job.printer.clone();
+    real.alignment = MISSED;
+    let radii = |text: &[u8], job: &Job| -> (f64, f64) {
+        let places = outer_wall(text, job, &real);
+        let radii = places.iter().map(|p| p.coords.norm());
+        radii.fold((f64::MAX, 0.0), |(low, high), r| (low.min(r), high.max(r)))
+    };
+    let radius: f64 = 2.5 - 0.45 / 2.0;
+    // A polygon of 360 corners, and the slicer's own thinning of outlines.
+    let slack = WITHIN + 0.005;
+    let naive = program(&boss(), &settings, &job);
+    let (low, high) = radii(&naive, &job);
+    let wrong = radius.hypot(0.5);
+    assert!((low - wrong).abs() < slack && (high - wrong).abs() < slack, "{low} {high}");
+    job.printer.alignment = MISSED;
+    let corrected = program(&boss(), &settings, &job);
+    let (low, high) = radii(&corrected, &job);
+    assert!((low - radius).abs() < slack && (high - radius).abs() < slack, "{low} {high}");
+}
+
+#[test]
+fn what_lies_over_the_axis_is_printed_in_every_dialect() {
+    let disc: Vec<[f64; 2]> = (0..120)
+        .map(|k| (f64::from(k) * 3.0).to_radians())
+        .map(|angle| [8.0 * angle.cos(), 8.0 * angle.sin()])
+        .collect();
+    let models = [shapes::extruded(&disc, &[], 0.8), shapes::cross(2.0)];
+    let printers = [
+        "generic-polar",
+        "klipper-polar",
+        "rrf-polar",
+        "marlin-polar",
+        "grblhal-polar",
+        "core-r-theta",
+        "linuxcnc-rotary",
+    ];
+    for printer in printers {
+        let (settings, job) = job(printer, &["fill_density=1"]);
+        for model in &models {
+            program(model, &settings, &job);
+        }
+    }
+}
+
+#[test]
+fn wires_to_the_bed_bound_its_turn() {
+    let (settings, job) = job("generic-polar", &["turns_max=4", "fill_density=0"]);
+    let text = program(&shapes::block(30.0, 30.0, 4.0), &settings, &job);
+    let (mut most, mut turned): (f64, f64) = (0.0, 0.0);
+    check(text.as_slice(), &job, None, |segment| {
+        if let Some([from, to]) = segment.joints {
+            most = most.max(to.turn.radians().abs() / std::f64::consts::TAU);
+            turned += (to.turn.radians() - from.turn.radians()).abs() / std::f64::consts::TAU;
+        }
+    })
+    .expect("memory");
+    assert!(most <= 4.0, "{most}");
+    assert!(turned > 20.0, "there was something to unwind: {turned}");
+}
+
+#[test]
+fn a_probed_bed_and_a_loose_drive_print_the_same_part() {
+    let (settings, mut job) = job("generic-polar", &["fill_density=0", "skirts=0"]);
+    let probes: Vec<[f64; 3]> = (0..9)
+        .map(|k| {
+            let (x, y) = (f64::from(k % 3) * 40.0 - 40.0, f64::from(k / 3) * 40.0 - 40.0);
+            [x, y, 0.002 * x - 0.001 * y + 0.0001 * x * x]
+        })
+        .collect();
+    let level = program(&square_tube(), &settings, &job);
+    let meant = outer_wall(&level, &job, &job.printer.clone());
+    job.printer.bed_map =
+        machine::height_map::HeightMap::new(&probes, 10.0).expect("a map of a bed");
+    job.printer.alignment.bed.backlash = 0.2_f64.to_radians();
+    // The twin knows the bed and the play of its drive, and finds the part true.
+    let told = program(&square_tube(), &settings, &job);
+    let half = meant.iter().map(|p| p.x.abs()).fold(0.0, f64::max);
+    for place in outer_wall(&told, &job, &job.printer.clone()) {
+        assert!(off_square(&place, half) <= WITHIN, "{place}");
+    }
+    let raised = job.printer.bed_map.height(&Vector2::new(19.0, -19.0));
+    let text = String::from_utf8(told).expect("ASCII");
+    let heights: Vec<f64> = text
+        .lines()
+        .filter(|line| line.starts_with("G1 R"))
+        .filter_map(|line| line.split(" Z").nth(1)?.split(' ').next()?.parse().ok())
+        .collect();
+    assert!(raised > 0.05 && heights.len() > 100, "the lift follows the bed: {}", heights.len());
+}
