@@ -90,7 +90,7 @@ pub(crate) fn motions(text: &str) -> Vec<Motion<'_>> {
         } else if let Some(value) = words.strip_prefix(";LAYER:") {
             layer = Some(value.parse().unwrap());
         }
-        let Some(words) = words.strip_prefix("G1 ") else { continue };
+        let Some(words) = words.trim_end_matches(" ;E").strip_prefix("G1 ") else { continue };
         let from = at;
         let mut e = 0.0;
         for word in words.split(' ') {

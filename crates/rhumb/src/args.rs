@@ -172,8 +172,8 @@ impl Units {
 /// The surface that layers follow. A shorter way to write settings.
 #[derive(Debug, Clone, Default, Args)]
 pub struct LayerArguments {
-    /// The surface that layers follow: planar, conical, spherical or caps
-    #[arg(long, value_name = "KIND")]
+    /// The surface that layers follow
+    #[arg(long, value_name = "KIND", value_parser = ["planar", "conical", "spherical", "caps"])]
     pub layers: Option<String>,
     /// Slope of conical layers; positive when they fall outwards, negative for bowls
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
