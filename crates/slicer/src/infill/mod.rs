@@ -178,9 +178,7 @@ fn solid(
             filling.lines.extend(open_lines(core, chords, &SOLID_JOINS, role, bead, layer));
         }
         Pattern::Concentric => {
-            let (loops, thin) = concentric::solid(&area, &layer.chart, bead.spacing());
-            filling.lines.extend(closed_lines(loops, role, bead));
-            filling.thin.extend(thin);
+            concentric(&area, role, bead, layer, filling);
         }
         Pattern::Archimedean => {
             let core = layer.chart.inset(&area, bead.spacing() / 2.0);
@@ -188,9 +186,40 @@ fn solid(
             let phase = if layer.index.is_multiple_of(2) { 0.0 } else { std::f64::consts::PI };
             let turning = turning(layer.index);
             let chords = spiral::chords(&core, bead.spacing(), phase, turning, layer.tolerance);
-            filling.lines.extend(open_lines(&core, &chords, &SOLID_JOINS, role, bead, layer));
+            let lines = open_lines(&core, &chords, &SOLID_JOINS, role, bead, layer);
+            match balanced(&lines, &area, layer) {
+                Some(bead) => {
+                    filling.lines.extend(lines.into_iter().map(|l| FillLine { bead, ..l }))
+                }
+                // Too narrow for turns of a fixed pitch: loops follow the outline instead.
+                None => concentric(&area, role, bead, layer, filling),
+            }
         }
     }
+}
+
+fn concentric(area: &Region, role: Role, bead: Bead, layer: &FillLayer, filling: &mut Filling) {
+    let (loops, thin) = concentric::solid(area, &layer.chart, bead.spacing());
+    filling.lines.extend(closed_lines(loops, role, bead));
+    filling.thin.extend(thin);
+}
+
+/// How much wider or narrower than wanted the beads of a solid area may be to take its volume.
+const BALANCE: std::ops::RangeInclusive<f64> = 0.9..=1.1;
+
+/// The bead with which lines take the volume of their area: turns of a fixed pitch end where the
+/// area does, and leave a little more or less than their own place. `None` where that is too much.
+fn balanced(lines: &[FillLine], area: &Region, layer: &FillLayer) -> Option<Bead> {
+    let length: f64 = lines
+        .iter()
+        .flat_map(|line| line.points.windows(2))
+        .map(|w| layer.chart.length(&w[0], &w[1]))
+        .sum();
+    let bead = lines.first()?.bead;
+    let spacing = layer.chart.area(area) / length;
+    BALANCE
+        .contains(&(spacing / bead.spacing()))
+        .then(|| Bead::with_spacing(spacing, layer.thickness))
 }
 
 fn turning(index: usize) -> Turning {
