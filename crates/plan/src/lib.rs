@@ -11,6 +11,7 @@
 
 pub mod axis;
 pub mod cooling;
+pub mod follow;
 pub mod order;
 pub mod planner;
 pub mod printed;

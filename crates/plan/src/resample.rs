@@ -163,25 +163,36 @@ impl Resampler {
     ///
     /// [`Unreachable`] where the rail misses the axis by more than a stroke keeps from it.
     pub fn legs(&mut self, strokes: &[Stroke]) -> Result<Vec<Vec<Leg>>, Unreachable> {
+        self.legs_of_each(strokes).map_err(|(_, error)| error)
+    }
+
+    /// Like [`legs`](Self::legs), and says which stroke is out of reach.
+    pub(crate) fn legs_of_each(
+        &mut self,
+        strokes: &[Stroke],
+    ) -> Result<Vec<Vec<Leg>>, (usize, Unreachable)> {
         let mut all = Vec::with_capacity(strokes.len());
-        for (index, stroke) in strokes.iter().enumerate() {
-            let at = Rotation2d(self.params.azimuth).turn(&stroke.to);
-            let target = Target {
-                over_bed: Point2::from(self.alignment.over_bed(&at.xy())),
-                z: stroke.to.z,
-            };
-            let mut legs = Vec::new();
-            if self.params.dialect.space == Space::Part {
-                self.straight(stroke, at, &mut legs);
-            } else if stroke.kind == Kind::Filament || target.over_bed == self.over_bed {
-                self.standing(stroke, target.z, &mut legs)?;
-            } else {
-                self.across(strokes, index, target, &mut legs)?;
-                self.unwind(strokes, index, &mut legs)?;
-            }
-            all.push(legs);
+        for index in 0..strokes.len() {
+            all.push(self.legs_of(strokes, index).map_err(|error| (index, error))?);
         }
         Ok(all)
+    }
+
+    fn legs_of(&mut self, strokes: &[Stroke], index: usize) -> Result<Vec<Leg>, Unreachable> {
+        let stroke = &strokes[index];
+        let at = Rotation2d(self.params.azimuth).turn(&stroke.to);
+        let target =
+            Target { over_bed: Point2::from(self.alignment.over_bed(&at.xy())), z: stroke.to.z };
+        let mut legs = Vec::new();
+        if self.params.dialect.space == Space::Part {
+            self.straight(stroke, at, &mut legs);
+        } else if stroke.kind == Kind::Filament || target.over_bed == self.over_bed {
+            self.standing(stroke, target.z, &mut legs)?;
+        } else {
+            self.across(strokes, index, target, &mut legs)?;
+            self.unwind(strokes, index, &mut legs)?;
+        }
+        Ok(legs)
     }
 
     /// A stroke in a dialect whose moves are straight over the part.

@@ -70,6 +70,8 @@ pub enum Command {
     Inspect(Inspect),
     /// List the ways to lay a model down, and write it turned
     Orient(Orient),
+    /// Turn any slicer's Cartesian program into one for a polar printer
+    Convert(Box<Convert>),
     /// Read a program again and prove it on a model of the machine
     Verify(Verify),
     /// Draw a program
@@ -248,6 +250,23 @@ pub struct Orient {
     /// How the model is placed
     #[command(flatten)]
     pub place: PlaceArguments,
+    /// Which settings to use
+    #[command(flatten)]
+    pub settings: SettingsArguments,
+}
+
+/// Arguments of `convert`.
+#[derive(Debug, Args)]
+pub struct Convert {
+    /// The program, as PrusaSlicer, Cura, Orca or Slic3r write it; `-` reads standard input
+    pub program: PathBuf,
+    /// Where the new program goes; `-` writes standard output [default: IN.polar.gcode]
+    #[arg(short, long, value_name = "OUT.gcode")]
+    pub output: Option<PathBuf>,
+    /// The place of the source's bed that becomes the rotation axis, mm; `auto` for the middle of
+    /// what is printed
+    #[arg(long, value_name = "X,Y|auto", default_value = "0,0", allow_hyphen_values = true)]
+    pub origin: String,
     /// Which settings to use
     #[command(flatten)]
     pub settings: SettingsArguments,

@@ -36,6 +36,7 @@ pub mod calibration;
 pub mod check;
 pub mod clock;
 pub mod commands;
+pub mod convert;
 pub mod failure;
 pub mod input;
 pub mod interrupt;

@@ -152,6 +152,11 @@ impl<W: Write> Emitter<W> {
             self.inverse_time = false;
             self.text("G94")?;
         }
+        if line.trim_start().starts_with("G28") {
+            // Where the machine stands now is not where it was told last.
+            (self.position, self.turn) = (None, None);
+            self.recounted = 0.0;
+        }
         self.text(line)
     }
 
@@ -254,8 +259,13 @@ impl<W: Write> Emitter<W> {
         }
     }
 
-    /// Sets the count of the bed back by whole turns where it has grown too large for the firmware.
-    fn recount(&mut self) -> io::Result<()> {
+    /// Sets the count of the bed back by whole turns where it has grown too large for the firmware;
+    /// done by itself at every [`Step::Layer`].
+    ///
+    /// # Errors
+    ///
+    /// What the writer reports.
+    pub fn recount(&mut self) -> io::Result<()> {
         let (Some(beyond), Some(turn)) = (self.dialect.recount_beyond, self.turn) else {
             return Ok(());
         };

@@ -1,0 +1,146 @@
+//! Strokes that somebody else put in order become timed moves.
+//!
+//! The same subdivision, axis rules and speed law as for our own layers, for ways that come from
+//! elsewhere, such as another slicer's program. Between two calls the machine comes to rest.
+
+use machine::kinematics::Unreachable;
+use machine::profile::Printer;
+use machine::program::Move;
+
+use crate::resample::{Leg, ResampleParams, Resampler};
+use crate::route::{Kind, Stroke};
+use crate::speed::{Limits, Pace, durations, travels};
+use crate::time;
+
+/// Follows strokes; remembers where the machine stands. See the [module](self).
+#[derive(Debug, Clone)]
+pub struct Follower {
+    printer: Printer,
+    params: ResampleParams,
+    resampler: Resampler,
+    limits: Limits,
+    pace: Pace,
+    /// Filament of strokes too short to be moves, mm.
+    owed: f64,
+    time: f64,
+}
+
+/// A stroke that cannot be followed.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("{source}")]
+pub struct FollowError {
+    /// Which one, counted from 0 in the call.
+    pub stroke: usize,
+    /// Why.
+    #[source]
+    pub source: Unreachable,
+}
+
+impl Follower {
+    /// Returns a follower for a printer at its home position.
+    #[must_use]
+    pub fn new(printer: &Printer, params: ResampleParams) -> Self {
+        Self {
+            printer: printer.clone(),
+            params,
+            resampler: Resampler::new(printer, params),
+            limits: Limits::of(printer, params.dialect.space),
+            pace: Pace::REST,
+            owed: 0.0,
+            time: 0.0,
+        }
+    }
+
+    /// The machine has been homed by other means.
+    pub fn homed(&mut self) {
+        self.resampler = Resampler::new(&self.printer, self.params);
+        self.pace = Pace::REST;
+    }
+
+    /// Returns the moves of each stroke.
+    ///
+    /// # Errors
+    ///
+    /// [`FollowError`] for the first stroke out of reach.
+    pub fn follow(&mut self, strokes: &[Stroke]) -> Result<Vec<Vec<Move>>, FollowError> {
+        let start = self.resampler.joints();
+        let mut groups = self
+            .resampler
+            .legs_of_each(strokes)
+            .map_err(|(stroke, source)| FollowError { stroke, source })?;
+        for (stroke, legs) in strokes.iter().zip(&mut groups) {
+            self.owe(stroke, legs);
+        }
+        let sizes: Vec<usize> = groups.iter().map(Vec::len).collect();
+        let legs: Vec<Leg> = groups.into_iter().flatten().collect();
+        let travels = travels(&legs, start);
+        let (times, pace) = durations(&legs, &travels, self.pace, &self.limits);
+        self.pace = pace;
+        self.time += time::estimate(&legs, &travels, &times, &self.printer);
+        let mut moves = legs.iter().zip(times).map(|(leg, duration)| Move {
+            to: leg.to,
+            at: leg.at,
+            filament: leg.filament,
+            path: leg.path,
+            duration,
+        });
+        Ok(sizes.iter().map(|&size| moves.by_ref().take(size).collect()).collect())
+    }
+
+    /// Keeps the filament of a stroke that became no move for the next one that lays material.
+    fn owe(&mut self, stroke: &Stroke, legs: &mut [Leg]) {
+        if legs.is_empty() {
+            self.owed += stroke.filament;
+        } else if stroke.kind == Kind::Print && self.owed != 0.0 {
+            let path: f64 = legs.iter().map(|leg| leg.path).sum();
+            for leg in legs.iter_mut() {
+                leg.filament += self.owed * leg.path / path;
+            }
+            self.owed = 0.0;
+        }
+    }
+
+    /// Returns the time estimated so far, s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::printer;
+    use machine::gcode::dialect::POLAR;
+    use nalgebra::Point3;
+
+    const PARAMS: ResampleParams =
+        ResampleParams { chord: 0.005, travel_chord: 0.1, dialect: POLAR, azimuth: 0.0 };
+
+    fn print(x: f64, filament: f64) -> Stroke {
+        let to = Point3::new(x, 5.0, 0.2);
+        Stroke { kind: Kind::Print, to, filament, speed: 40.0 }
+    }
+
+    #[test]
+    fn no_filament_is_lost_in_strokes_too_short_to_be_moves() {
+        let mut follower = Follower::new(&printer(), PARAMS);
+        let travel = Stroke { kind: Kind::Travel, ..print(0.0, 0.0) };
+        follower.follow(&[travel]).unwrap();
+        let strokes: Vec<Stroke> =
+            (1..=1000).map(|k| print(f64::from(k) * 1e-4 + f64::from(k / 50), 0.01)).collect();
+        let moves = follower.follow(&strokes).unwrap();
+        let fed: f64 = moves.iter().flatten().map(|motion| motion.filament).sum();
+        assert!((fed + follower.owed - 10.0).abs() < 1e-9, "{fed}");
+        assert!(moves.iter().any(Vec::is_empty), "some are too short");
+        assert!(follower.time() > 0.4);
+    }
+
+    #[test]
+    fn what_is_out_of_reach_is_named() {
+        let mut follower = Follower::new(&printer(), PARAMS);
+        let error = follower.follow(&[print(50.0, 0.0), print(130.0, 1.0)]).unwrap_err();
+        assert_eq!(error.stroke, 1);
+        assert!(error.to_string().contains("carriage"), "{error}");
+    }
+}

@@ -1,0 +1,117 @@
+//! `rhumb convert`: any slicer's Cartesian program for a polar machine.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, BufWriter, Cursor, Write};
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector2;
+
+use super::{DONE, LOOK, display_name, say, say_json, settings};
+use crate::args::{Convert, Manner};
+use crate::clock;
+use crate::convert::{Converted, Request, convert, middle};
+use crate::failure::Failure;
+use crate::input;
+use crate::interrupt::Interrupt;
+use crate::output::{self, Output};
+use crate::place::parse_centre;
+use crate::program_text::duration;
+
+pub(super) fn run(arguments: &Convert, manner: &Manner) -> Result<u8, Failure> {
+    let interrupt = Interrupt::on_signals();
+    let (_, job) = settings(&arguments.settings)?;
+    let source = Source::open(&arguments.program)?;
+    let name = display_name(&arguments.program);
+    let origin = match arguments.origin.as_str() {
+        "auto" => middle(source.reader()?, &name)?,
+        place => parse_centre(place)?.coords,
+    };
+    let target = target(arguments);
+    let mut out = Output::create(&target, &[arguments.program.as_path()])?;
+    let request = Request { name: &name, origin, job: &job, made_at: &clock::now() };
+    let converted = {
+        let mut text = BufWriter::with_capacity(1 << 16, out.file());
+        let converted = convert(&request, source.reader()?, &mut text, &interrupt)?;
+        text.flush().map_err(|error| output::failed(&target, &error))?;
+        converted
+    };
+    interrupt.check()?;
+    out.commit()?;
+    tell(&converted, &origin, &target, manner)?;
+    Ok(if converted.left_out > 0 { LOOK } else { DONE })
+}
+
+/// A program that can be read from its begin more than once.
+enum Source {
+    File(PathBuf),
+    /// Standard input and what else cannot be read twice.
+    Bytes(Vec<u8>),
+}
+
+impl Source {
+    fn open(path: &Path) -> Result<Self, Failure> {
+        let is_file = std::fs::metadata(path).is_ok_and(|metadata| metadata.is_file());
+        Ok(if is_file { Self::File(path.to_owned()) } else { Self::Bytes(input::read(path)?) })
+    }
+
+    fn reader(&self) -> Result<Box<dyn BufRead + '_>, Failure> {
+        match self {
+            Self::File(path) => {
+                let file = File::open(path).map_err(|error| {
+                    let class = match error.kind() {
+                        std::io::ErrorKind::NotFound => "NotFound",
+                        std::io::ErrorKind::PermissionDenied => "PermissionDenied",
+                        _ => "Unreadable",
+                    };
+                    Failure::new(class, format!("{}: {error}", path.display()))
+                })?;
+                Ok(Box::new(BufReader::with_capacity(1 << 18, file)))
+            }
+            Self::Bytes(bytes) => Ok(Box::new(Cursor::new(bytes.as_slice()))),
+        }
+    }
+}
+
+/// Where the program goes: `IN.polar.gcode` in the working folder unless the user says.
+fn target(arguments: &Convert) -> PathBuf {
+    arguments.output.clone().unwrap_or_else(|| {
+        let stem = arguments.program.file_stem().filter(|_| arguments.program != Path::new("-"));
+        let mut name = stem.unwrap_or("program".as_ref()).to_owned();
+        name.push(".polar.gcode");
+        PathBuf::from(name)
+    })
+}
+
+fn tell(
+    converted: &Converted,
+    origin: &Vector2<f64>,
+    target: &Path,
+    manner: &Manner,
+) -> Result<(), Failure> {
+    if target == Path::new("-") || manner.quiet && !manner.json {
+        return Ok(());
+    }
+    let Converted { lines, written, filament, time, left_out } = *converted;
+    if manner.json {
+        return say_json(&serde_json::json!({
+            "lines": lines,
+            "written": written,
+            "filament_mm": filament,
+            "time_s": time,
+            "left_out": left_out,
+            "origin_mm": [origin.x, origin.y],
+        }));
+    }
+    let mut text = format!(
+        "{lines} lines became {written}, {:.2} m of filament, about {}\n",
+        filament / 1000.0,
+        duration(time)
+    );
+    if left_out > 0 {
+        text.push_str(&format!(
+            "{left_out} commands are longer than firmwares read and were left out\n"
+        ));
+    }
+    text.push_str(&format!("written  {}\n", display_name(target)));
+    say(&text)
+}
