@@ -5,6 +5,7 @@
 //! sources together and remembers which one each value came from, [`resolve`] turns the result into
 //! the parameters of each stage, and [`template`] fills the start and end programs.
 
+mod expression;
 pub mod file;
 pub mod key;
 pub mod merge;

@@ -1,82 +1,219 @@
-//! Start and end programs: lines with names in braces that are filled in.
+//! Start and end programs: text with expressions in braces, in `PrusaSlicer`'s syntax.
 //!
-//! `{first_layer_temperature}` becomes the value of that setting, by the name under which it stands
-//! at the end of a program (PrusaSlicer's name where it has one).
+//! * `{temperature + 5}` is worth its value; `[temperature]` is the older form for a bare name. Names
+//!   are those under which settings stand at the end of a program (`PrusaSlicer`'s where it has
+//!   one); an index as in `{temperature[0]}` names the extruder and is 0.
+//! * `{if first_layer_temperature > 220}…{elsif …}…{else}…{endif}` keeps one of its parts.
+//! * Operators, weakest first: `or` `||`, `and` `&&`, `not` `!`, `== != <> < <= > >=`, `+ -`,
+//!   `* / %`, sign. Functions: `min`, `max`, `round`, `int`, `digits` and `zdigits` (value, places
+//!   before, places after the point). Texts are in double quotes; `==` and `+` take them too.
+//!
+//! A program is filled in as a whole, so an `if` may span lines.
 
-use super::key::{KEYS, Kind};
+use super::expression::{Fault, Names, Worth, evaluate};
+use super::key::{KEYS, Kind, Value};
 use super::merge::Settings;
 use crate::failure::Failure;
 
-/// Returns the lines of a program with all names filled in.
+/// Returns the lines of a program with everything in braces filled in.
 ///
 /// # Errors
 ///
-/// `ConfigSyntax` for a brace without its partner, `ConfigUnknownKey` for a name that is none.
+/// `ConfigSyntax` for a brace without its partner or an expression that is none,
+/// `ConfigUnknownKey` for a name that is none.
 pub fn fill(program: &str, name: &str, settings: &Settings) -> Result<Vec<String>, Failure> {
-    program
-        .lines()
-        .enumerate()
-        .map(|(index, line)| fill_line(line, settings).map_err(|why| why.at(name, index + 1)))
-        .collect()
+    let names = OfSettings(settings);
+    let mut filler = Filler { names: &names, branches: Vec::new(), filled: String::new() };
+    let mut rest = program;
+    while let Some(open) = rest.find(['{', '[', '}']) {
+        let before = &program[..program.len() - rest.len() + open];
+        let line = before.matches('\n').count() + 1;
+        let fail = |fault: Fault| failure(&fault, name, line);
+        filler.text(&rest[..open]);
+        rest = match rest.as_bytes()[open] {
+            b'{' => {
+                let (inside, after) = rest[open + 1..]
+                    .split_once('}')
+                    .ok_or_else(|| fail(Fault::Syntax("a brace has no partner".into())))?;
+                filler.braces(inside.trim()).map_err(fail)?;
+                after_a_lone_tag(inside, after, &rest[..open], filler.filled.as_str())
+            }
+            b'[' => filler.brackets(&rest[open + 1..]).map_err(fail)?,
+            _ => return Err(fail(Fault::Syntax("a brace has no partner".into()))),
+        };
+    }
+    filler.text(rest);
+    if !filler.branches.is_empty() {
+        let fault = Fault::Syntax("an if has no endif".into());
+        return Err(failure(&fault, name, program.lines().count()));
+    }
+    Ok(filler.filled.lines().map(str::to_owned).collect())
 }
 
-enum Fault {
-    OpenBrace,
-    NoSuchName(String),
+/// A line that holds nothing but a tag leaves no empty line behind.
+fn after_a_lone_tag<'a>(inside: &str, after: &'a str, before: &str, filled: &str) -> &'a str {
+    let is_tag = ["if", "elsif", "else", "endif"]
+        .contains(&inside.split_whitespace().next().unwrap_or_default());
+    let begins_line = before.ends_with('\n') || before.is_empty() && !filled.ends_with(' ');
+    match after.strip_prefix('\n') {
+        Some(next) if is_tag && begins_line => next,
+        _ => after,
+    }
 }
 
-impl Fault {
-    fn at(self, program: &str, line: usize) -> Failure {
-        match self {
-            Self::OpenBrace => Failure::new(
-                "ConfigSyntax",
-                format!("{program}, line {line}: a brace has no partner"),
-            ),
-            Self::NoSuchName(name) => Failure::new(
-                "ConfigUnknownKey",
-                format!("{program}, line {line}: there is nothing to fill in for {{{name}}}"),
-            )
-            .hint("names are those of the settings at the end of a program"),
+fn failure(fault: &Fault, program: &str, line: usize) -> Failure {
+    match fault {
+        Fault::Syntax(what) => {
+            Failure::new("ConfigSyntax", format!("{program}, line {line}: {what}"))
+        }
+        Fault::NoSuchName(name) => Failure::new(
+            "ConfigUnknownKey",
+            format!("{program}, line {line}: there is nothing to fill in for {{{name}}}"),
+        )
+        .hint("names are those of the settings at the end of a program"),
+    }
+}
+
+/// One `if` that is open.
+struct Branch {
+    /// Whether the text around it is kept.
+    outer: bool,
+    /// Whether one of its parts was kept already.
+    taken: bool,
+    /// Whether the present part is kept.
+    kept: bool,
+    has_else: bool,
+}
+
+struct Filler<'a> {
+    names: &'a dyn Names,
+    branches: Vec<Branch>,
+    filled: String,
+}
+
+impl Filler<'_> {
+    fn is_kept(&self) -> bool {
+        self.branches.last().is_none_or(|branch| branch.kept)
+    }
+
+    fn text(&mut self, text: &str) {
+        if self.is_kept() {
+            self.filled.push_str(text);
         }
     }
+
+    fn braces(&mut self, inside: &str) -> Result<(), Fault> {
+        let (word, rest) = inside.split_once(char::is_whitespace).unwrap_or((inside, ""));
+        match word {
+            "if" => {
+                let outer = self.is_kept();
+                // What is left out is not looked at: it may name what is not there.
+                let kept = outer && self.condition(rest)?;
+                self.branches.push(Branch { outer, taken: kept, kept, has_else: false });
+            }
+            "elsif" | "else" => {
+                let branch = self.branches.last().filter(|branch| !branch.has_else);
+                let branch = branch.ok_or_else(|| stray(word))?;
+                let open = branch.outer && !branch.taken;
+                let kept = open && (word == "else" || self.condition(rest)?);
+                if let Some(branch) = self.branches.last_mut() {
+                    branch.kept = kept;
+                    branch.taken |= kept;
+                    branch.has_else = word == "else";
+                }
+            }
+            "endif" => {
+                self.branches.pop().ok_or_else(|| stray(word))?;
+            }
+            _ if self.is_kept() => {
+                let worth = evaluate(inside, self.names)?;
+                self.filled.push_str(&worth.to_string());
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn condition(&self, text: &str) -> Result<bool, Fault> {
+        evaluate(text, self.names)?.is_true()
+    }
+
+    /// The older form of a name; returns what follows. Other brackets stay as they are.
+    fn brackets<'b>(&mut self, after: &'b str) -> Result<&'b str, Fault> {
+        let name = after.split(']').next().unwrap_or_default();
+        let is_name = name.len() < after.len()
+            && name.bytes().all(|c| c.is_ascii_alphanumeric() || c == b'_')
+            && name.bytes().next().is_some_and(|c| c.is_ascii_alphabetic());
+        if !is_name {
+            self.text("[");
+            return Ok(after);
+        }
+        if self.is_kept() {
+            let worth = evaluate(name, self.names)?;
+            self.filled.push_str(&worth.to_string());
+        }
+        Ok(&after[name.len() + 1..])
+    }
 }
 
-fn fill_line(line: &str, settings: &Settings) -> Result<String, Fault> {
-    let mut filled = String::new();
-    let mut rest = line;
-    while let Some((before, after)) = rest.split_once('{') {
-        let (name, tail) = after.split_once('}').ok_or(Fault::OpenBrace)?;
-        filled.push_str(before);
-        filled.push_str(&value_of(name.trim(), settings)?);
-        rest = tail;
-    }
-    if rest.contains('}') {
-        return Err(Fault::OpenBrace);
-    }
-    filled.push_str(rest);
-    Ok(filled)
+fn stray(word: &str) -> Fault {
+    Fault::Syntax(format!("{word} without an if"))
 }
 
-fn value_of(name: &str, settings: &Settings) -> Result<String, Fault> {
-    KEYS.iter()
+struct OfSettings<'a>(&'a Settings);
+
+impl Names for OfSettings<'_> {
+    fn get(&self, name: &str) -> Option<Worth> {
         // A program inside a program would be filled in without end.
-        .find(|key| key.program_name == name && key.kind != Kind::Text)
-        .map(|key| settings.get(key).0.to_string())
-        .ok_or_else(|| Fault::NoSuchName(name.chars().take(60).collect()))
+        let is_program = |name: &str| name.ends_with("_gcode");
+        let key = KEYS.iter().find(|key| {
+            key.program_name == name && !(key.kind == Kind::Text && is_program(key.name))
+        })?;
+        Some(match self.0.get(key).0 {
+            Value::Number(number) => Worth::Number(*number),
+            Value::Count(count) => Worth::Number(*count as f64),
+            Value::Switch(switch) => Worth::Truth(*switch),
+            Value::Text(text) => Worth::Text(text.clone()),
+        })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn filled(program: &str) -> Vec<String> {
+        fill(program, "start_gcode", &Settings::defaults()).unwrap()
+    }
+
     #[test]
     fn names_are_filled_in() {
-        let settings = Settings::defaults();
-        let program = "M109 S{first_layer_temperature}\n; {layer_height} mm, {perimeters} walls";
         assert_eq!(
-            fill(program, "start_gcode", &settings).unwrap(),
+            filled("M109 S{first_layer_temperature}\n; {layer_height} mm, {perimeters} walls"),
             ["M109 S215", "; 0.2 mm, 2 walls"]
         );
+        assert_eq!(
+            filled("M104 S[temperature] ; {filament_type[0]} [not a name] [1]"),
+            ["M104 S210 ; PLA [not a name] [1]"]
+        );
+        assert!(filled("").is_empty());
+    }
+
+    #[test]
+    fn arithmetic_in_braces() {
+        assert_eq!(filled("M104 S{temperature[0] - 5 * 2}"), ["M104 S200"]);
+        assert_eq!(filled("G1 Z{layer_height*3} E{round(0.2 + 7 / 2)}"), ["G1 Z0.6 E4"]);
+        assert_eq!(filled("{min(temperature, 200)} {max(1, 2, 3)} {int(2.9)}"), ["200 3 2"]);
+    }
+
+    #[test]
+    fn one_part_of_an_if_is_kept() {
+        let program =
+            "{if bed_temperature > 100}hot{elsif bed_temperature > 50}warm{else}cold{endif}";
+        assert_eq!(filled(program), ["warm"]);
+        let lines = "G28\n{if filament_type == \"PLA\" and not (perimeters < 2)}\nM106 S255\n\
+            {if nozzle_diameter == 0.6}\nM900\n{endif}\n{else}\nM107 {nothing}\n{endif}\nM83";
+        assert_eq!(filled(lines), ["G28", "M106 S255", "M83"]);
     }
 
     #[test]
@@ -84,8 +221,15 @@ mod tests {
         let settings = Settings::defaults();
         let class = |program: &str| fill(program, "p", &settings).unwrap_err().class();
         assert_eq!(class("M109 S{temprature}"), "ConfigUnknownKey");
+        assert_eq!(class("M109 S[temprature]"), "ConfigUnknownKey");
         assert_eq!(class("M109 S{temperature"), "ConfigSyntax");
         assert_eq!(class("M109 Stemperature}"), "ConfigSyntax");
         assert_eq!(class("{start_gcode}"), "ConfigUnknownKey");
+        assert_eq!(class("{if 1 > 2}M84"), "ConfigSyntax");
+        assert_eq!(class("{endif}"), "ConfigSyntax");
+        assert_eq!(class("{if 1 > 0}a{else}b{else}c{endif}"), "ConfigSyntax");
+        assert_eq!(class("{1 / 0}"), "ConfigSyntax");
+        let text = fill("G28\nM84\n{1 +}", "p", &settings).unwrap_err().to_string();
+        assert!(text.contains("line 3"), "{text}");
     }
 }
