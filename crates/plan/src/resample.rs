@@ -523,7 +523,18 @@ impl Resampler {
         (unit.perp(&a) - wanted).abs() <= self.params.chord
             && -unit.dot(&a) > room
             && unit.dot(&b) > room
+            && self.runs_straight_to(target, self.branch.opposite())
             && self.reaches_run(strokes, index, self.branch.opposite())
+    }
+
+    /// Whether one move to the other side of the axis stays near its line: with one end close to
+    /// the axis a small miss is a large angle there, which the bed turns through all along the move.
+    fn runs_straight_to(&self, target: &Target, branch: Branch) -> bool {
+        let part = self.alignment.part_from_bed(&target.over_bed.coords);
+        let part = Point3::new(part.x, part.y, target.z);
+        self.alignment
+            .joints_from_part(&part, branch, self.joints.turn)
+            .is_ok_and(|to| self.is_near_enough(&to, target, self.params.chord))
     }
 
     /// Whether the rail reaches the end of stroke `index`, and of all that follows up to the next
@@ -663,6 +674,24 @@ mod tests {
         legs(&mut resampler, &[travel(0.0, 15.0), travel(-40.0, 0.0)]);
         let line = legs(&mut resampler, &[print(40.0, 0.0)]);
         assert!(line.iter().all(|leg| leg.to.s > 0.0));
+    }
+
+    #[test]
+    fn a_line_that_ends_just_past_the_axis_stays_straight() {
+        for beyond in [0.011, 0.05, 0.3, 5.0] {
+            for miss in [-0.004, 0.0, 0.003] {
+                let mut resampler = Resampler::new(&printer(), PARAMS);
+                legs(&mut resampler, &[travel(0.0, 15.0), travel(-20.0, miss)]);
+                let start = resampler.joints();
+                let line = legs(&mut resampler, &[print(beyond, miss)]);
+                let worst = deviation(start, &line, [-20.0, miss], [beyond, miss]);
+                // The detour round the axis, where there is one, is as wide as the clearance.
+                assert!(
+                    worst <= 0.005 * 1.05 + printer().axis_clearance,
+                    "{worst} {beyond} {miss}"
+                );
+            }
+        }
     }
 
     #[test]
