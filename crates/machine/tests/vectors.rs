@@ -1,6 +1,7 @@
 //! The kinematics against published numbers, where the folder with the vectors is at hand.
 
 use machine::backlash::Backlash;
+use machine::gcode::speed_word::{SpeedWord, Way};
 use machine::height_map::HeightMap;
 use machine::kinematics::{Alignment, BedScale, Branch};
 use machine::plate_shift::PlateShift;
@@ -190,5 +191,17 @@ fn rates_along_a_line_are_those_of_the_theory() {
             let wanted = number(case, name);
             assert!((value - wanted).abs() < 1e-4 * (1.0 + wanted.abs()), "{name} {value} {case}");
         }
+    }
+}
+
+#[test]
+fn inverse_time_words() {
+    let Some(all) = vectors("calibration.json") else { return };
+    for case in all["F_words"].as_array().unwrap() {
+        let turn = number(case, "dC_deg").to_radians();
+        let length = number(case, "ds").hypot(number(case, "dz"));
+        let way = Way { path: length, words: length, filament: 0.0, turn, radius: 20.0 };
+        let word = SpeedWord::InverseTime.word(&way, number(case, "T"));
+        assert!((word - number(case, "F_G93")).abs() < 1e-9, "{case}: {word}");
     }
 }
