@@ -46,11 +46,12 @@ impl<'a> Cut<'a> {
     }
 
     /// Appends the points between `enter` and `leave` in which the outline passes through the
-    /// facet, without these two. They lie on the sides of the given numbers.
+    /// facet, without these two. `sides` tells the numbers of the sides that they lie on.
     pub(super) fn between(
         &self,
-        (enter, enter_side): (&Point3<f64>, usize),
-        (leave, leave_side): (&Point3<f64>, usize),
+        enter: &Point3<f64>,
+        leave: &Point3<f64>,
+        sides: impl Fn() -> [usize; 2],
         points: &mut Vec<Point3<f64>>,
     ) {
         let chord = enter - leave;
@@ -60,6 +61,7 @@ impl<'a> Cut<'a> {
         }
         // Nothing but a corner is cut off; otherwise K fills the facet almost to that place, and
         // the curve runs once around it.
+        let [enter_side, leave_side] = sides();
         if enter_side == (leave_side + 1) % 3 {
             return;
         }

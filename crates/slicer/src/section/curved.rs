@@ -47,20 +47,33 @@ const BISECTIONS: u32 = 60;
 impl Field<'_> {
     /// The least F of a facet when that is not at one of its corners.
     pub(super) fn low(&self, facet: u32) -> Option<f64> {
-        let sides = self.solid.sides()[facet as usize];
-        let on_sides = sides.into_iter().filter_map(|side| self.side_low(side));
+        let vertices = self.solid.mesh().triangles[facet as usize];
+        let corners = vertices.map(|v| self.at(v));
+        let values = vertices.map(|v| self.value(v));
+        let dips = |i: usize, j: usize| {
+            let (low, high) = if values[i] <= values[j] { (i, j) } else { (j, i) };
+            self.form.falls_towards(&corners[low], values[low], &corners[high])
+        };
+        let on_sides = [(0, 1), (1, 2), (2, 0)]
+            .into_iter()
+            .filter(|&(i, j)| dips(i, j))
+            .filter_map(|(i, j)| self.side_low(vertices[i], vertices[j]));
         let least = on_sides.reduce(f64::min)?;
         Some(self.facet_low(facet).map_or(least, |low| low.value.min(least)))
     }
 
-    /// F at the least place inside a side, if it has one. Always computed from the lower vertex to
-    /// the higher: both facets must decide alike.
-    fn side_low(&self, side: u32) -> Option<f64> {
-        let [low, high] = self.solid.ends(side);
+    /// F at the least place inside the side between two vertices, if it has one. Always computed
+    /// from the lower vertex to the higher: both facets must decide alike.
+    fn side_low(&self, v: u32, w: u32) -> Option<f64> {
+        let (low, high) = (v.min(w), v.max(w));
         let ((a, b), (value_a, value_b)) =
             ((self.at(low), self.at(high)), (self.value(low), self.value(high)));
-        let dips =
-            self.form.falls_towards(&a, value_a, &b) && self.form.falls_towards(&b, value_b, &a);
+        // F that falls from the end where it is less must rise again.
+        let dips = if value_a <= value_b {
+            self.form.falls_towards(&a, value_a, &b)
+        } else {
+            self.form.falls_towards(&b, value_b, &a)
+        };
         if !dips {
             return None;
         }
@@ -133,7 +146,7 @@ impl<'a> CurvedCut<'a> {
                 (true, false) => add(sides[side], is_backwards, true),
                 (false, true) => add(sides[side], is_backwards, false),
                 (false, false) => {
-                    if self.dips(sides[side]) {
+                    if self.dips(corners[from], corners[to]) {
                         add(sides[side], is_backwards, false);
                         add(sides[side], is_backwards, true);
                     }
@@ -152,9 +165,9 @@ impl<'a> CurvedCut<'a> {
         }
     }
 
-    /// Whether a side with both ends outside K reaches into it.
-    pub(super) fn dips(&self, side: u32) -> bool {
-        self.field.side_low(side).is_some_and(|least| least < self.value)
+    /// Whether the side between two vertices outside K reaches into it.
+    pub(super) fn dips(&self, v: u32, w: u32) -> bool {
+        self.field.side_low(v, w).is_some_and(|least| least < self.value)
     }
 
     /// The corners of a facet in pairs with their side, counter-clockwise in convex coordinates.
@@ -197,8 +210,9 @@ impl<'a> CurvedCut<'a> {
             let leave = if is_last && is_closed { begin } else { self.crossing(step.leave) };
             ring.push(self.chart(&enter));
             inner.clear();
-            let sides = [step.enter, step.leave].map(|crossing| self.place(step.facet, crossing));
-            self.cut(step.facet).between((&enter, sides[0]), (&leave, sides[1]), inner);
+            let sides =
+                || [step.enter, step.leave].map(|crossing| self.place(step.facet, crossing));
+            self.cut(step.facet).between(&enter, &leave, sides, inner);
             ring.extend(inner.iter().map(|p| self.chart(p)));
             if is_last && !is_closed {
                 ring.push(self.chart(&leave));
@@ -243,11 +257,15 @@ impl<'a> CurvedCut<'a> {
         }
         let t = if leaves { quadratic.leaves() } else { quadratic.enters() };
         let near = a.lerp(&b, t.clamp(from, to));
-        let residual = (self.form.value(&near) - self.value).abs();
-        if residual <= RESIDUAL * (1.0 + self.value.abs()) {
+        if quadratic.is_steep() || self.is_on_layer(&near) {
             return near;
         }
         a.lerp(&b, self.bisected(&a, &b, from, to, leaves))
+    }
+
+    fn is_on_layer(&self, p: &Point3<f64>) -> bool {
+        let residual = (self.form.value(p) - self.value).abs();
+        residual <= RESIDUAL * (1.0 + self.value.abs())
     }
 
     fn bisected(

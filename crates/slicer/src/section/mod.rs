@@ -57,6 +57,10 @@ pub struct Tears {
     pub dropped_length: f64,
 }
 
+/// The share of the tolerance that chords of curves in facets take; outlines are thinned out with
+/// the rest, which decides how many points later steps have to handle.
+const CURVE_SHARE: f64 = 0.25;
+
 /// A planar step has nothing to do with its facet once the sides are known.
 const NO_FACET: u32 = u32::MAX;
 
@@ -97,9 +101,8 @@ impl<'a> Cutter<'a> {
     /// exact curves.
     #[must_use]
     pub fn section(&self, k: usize, tolerance: f64) -> Section {
-        // Curves are followed with one half of the tolerance and thinned out with the other.
-        let share = if self.form.is_flat() { tolerance } else { tolerance / 2.0 };
-        let (outlines, tears) = self.outlines(k, share);
+        let curve_share = if self.form.is_flat() { 0.0 } else { CURVE_SHARE };
+        let (outlines, tears) = self.outlines(k, curve_share * tolerance);
         let mut rings: Vec<Ring> = Vec::new();
         for mut ring in outlines {
             // Points that fall on the same place of the grid would be corners without direction.
@@ -107,7 +110,7 @@ impl<'a> Cutter<'a> {
             while ring.len() > 1 && ring.first() == ring.last() {
                 ring.pop();
             }
-            let ring = simplify_ring(&ring, share);
+            let ring = simplify_ring(&ring, (1.0 - curve_share) * tolerance);
             if ring.len() >= 3 {
                 rings.push(ring);
             }

@@ -93,7 +93,7 @@ fn crossings_of_first_side(cut: &CurvedCut<'_>, cutter: &Cutter<'_>) -> Vec<(boo
         (true, true) => vec![],
         (true, false) => vec![at(true)],
         (false, true) => vec![at(false)],
-        (false, false) if cut.dips(side) => vec![at(false), at(true)],
+        (false, false) if cut.dips(0, 1) => vec![at(false), at(true)],
         (false, false) => vec![],
     }
 }
@@ -149,7 +149,7 @@ fn arcs_of_triangle(case: &Value, cutter: &Cutter<'_>, level: f64) {
         let sides = [step.enter, step.leave].map(|crossing| cut.place(0, crossing));
         let mut inner = Vec::new();
         let ends = (cut.crossing(step.enter), cut.crossing(step.leave));
-        cut.cut(0).between((&ends.0, sides[0]), (&ends.1, sides[1]), &mut inner);
+        cut.cut(0).between(&ends.0, &ends.1, || sides, &mut inner);
         line.append(&mut inner);
         line.push(ends.1);
         let length: f64 = line.windows(2).map(|w| (w[1] - w[0]).norm()).sum();

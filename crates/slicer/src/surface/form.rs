@@ -44,6 +44,16 @@ pub struct Quadratic {
 }
 
 impl Quadratic {
+    /// Returns whether the line meets the layer at so large an angle that rounding cannot show in
+    /// where it does.
+    #[must_use]
+    pub fn is_steep(&self) -> bool {
+        // Half the slope at the crossing is `root`; beside terms ten thousand times as large it
+        // would have lost four of its sixteen digits.
+        const LEAST_SHARE: f64 = 1e-4;
+        self.root > LEAST_SHARE * (self.a2.abs() + self.b.abs() + self.g.abs())
+    }
+
     /// Returns where the line leaves K: F grows there. Not a number when it never does.
     #[must_use]
     pub fn leaves(&self) -> f64 {
@@ -146,8 +156,8 @@ impl Form {
 
     /// Returns whether F falls at first on the way from `a`, where it is `value_a`, to `b`.
     ///
-    /// Costs no root. A segment that F falls into from both ends has its least place inside, and a
-    /// facet can only have one inside when F falls from its lowest corner into a side.
+    /// Costs no root. A segment that F falls into from its lower end has its least place inside, and
+    /// a facet can only have one inside when F falls from its lowest corner into a side.
     #[must_use]
     pub fn falls_towards(&self, a: &Point3<f64>, value_a: f64, b: &Point3<f64>) -> bool {
         let along = b - a;
