@@ -129,9 +129,7 @@ fn outlines_close_and_layers_add_up_to_the_volume() {
                     weight * surface.chart(*level).area(&section.region) / surface.level_step(1.0);
             }
             let error = sum / volume - 1.0;
-            // Thin shells: outlines may lie 0.5 µm off on either side of 300 µm, on average less.
-            let limit = if mesh_name == "thin shell" { 5e-4 } else { 1e-4 };
-            assert!(is_cap || error.abs() < limit, "{mesh_name}, {surface_name}: {error:e}");
+            assert!(is_cap || error.abs() < 1e-4, "{mesh_name}, {surface_name}: {error:e}");
         }
     }
 }
