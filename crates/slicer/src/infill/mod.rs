@@ -189,7 +189,7 @@ fn solid(
             let lines = open_lines(&core, &chords, &SOLID_JOINS, role, bead, layer);
             match balanced(&lines, &area, layer) {
                 Some(bead) => {
-                    filling.lines.extend(lines.into_iter().map(|l| FillLine { bead, ..l }))
+                    filling.lines.extend(lines.into_iter().map(|l| FillLine { bead, ..l }));
                 }
                 // Too narrow for turns of a fixed pitch: loops follow the outline instead.
                 None => concentric(&area, role, bead, layer, filling),
