@@ -21,6 +21,9 @@
 //! out farther, are passed over: such a part would stand on a point.
 
 mod classes;
+mod support;
+
+pub use support::{Rating, rate};
 
 use crate::mesh::Mesh;
 use crate::place::reference_azimuth;
@@ -98,6 +101,12 @@ pub fn candidates(mesh: &Mesh, params: &OrientParams) -> Vec<Candidate> {
     let faces = Faces::of(mesh);
     let classes = classes::classes(&faces, params.class_tolerance_rad);
     ranked(mesh, &faces, &classes[..classes.len().min(MOST_CLASSES)], params)
+}
+
+/// Returns the rotation `part_from_model` that lays the part down as a candidate says.
+#[must_use]
+pub fn laid(mesh: &Mesh, candidate: &Candidate) -> Rotation3<f64> {
+    part_from_model(mesh, &candidate.down)
 }
 
 /// Returns the rotation `part_from_model` that lays the part on its largest flat side.

@@ -128,11 +128,11 @@ impl SettingsArguments {
 /// How the model is placed.
 #[derive(Debug, Clone, Args)]
 pub struct PlaceArguments {
-    /// How to lay the model down: flat (on its largest flat face), keep, or turns about x, y and z
-    /// in degrees
+    /// How to lay the model down: flat (on its largest flat face), keep, its rank in the list of
+    /// `rhumb orient`, or turns about x, y and z in degrees
     #[arg(
         long,
-        value_name = "flat|keep|RX,RY,RZ",
+        value_name = "flat|keep|RANK|RX,RY,RZ",
         default_value = "flat",
         allow_hyphen_values = true
     )]

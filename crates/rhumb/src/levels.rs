@@ -161,12 +161,7 @@ impl Layout {
     pub fn summary(&self) -> Option<String> {
         let wanted = self.flats.iter().filter(|met| met.wanted).count();
         let missed = self.missed().count();
-        match (wanted, missed) {
-            (0, _) => None,
-            (1, 0) => Some("the only one is met".into()),
-            (_, 0) => Some(format!("all {wanted} are met")),
-            _ => Some(format!("{} of {wanted} are met", wanted - missed)),
-        }
+        (wanted > 0).then(|| format!("{} of {wanted} met", wanted - missed))
     }
 }
 
@@ -207,6 +202,10 @@ fn tidy(number: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interrupt::Interrupt;
+    use crate::pipeline::{Request, Watch, slice};
+    use crate::place::{Pose, Wish};
+    use crate::progress::Silent;
     use crate::settings::Settings;
     use mesh::shapes;
     use slicer::surface::Plane;
@@ -235,7 +234,48 @@ mod tests {
         assert_eq!(layout.flats.len(), 5);
         assert!(layout.flats.iter().all(|met| met.miss == 0.0), "{layout:?}");
         assert!(layout.warnings(Snap::Optimal).is_empty());
-        assert_eq!(layout.summary().unwrap(), "all 5 are met");
+        assert_eq!(layout.summary().unwrap(), "5 of 5 met");
+    }
+
+    /// The heights at which a program lays material, as its text says.
+    fn printed_heights(text: &str) -> Vec<f64> {
+        let mut z = f64::NAN;
+        let mut heights: Vec<f64> = Vec::new();
+        for line in text.lines().filter(|line| line.starts_with("G1 ")) {
+            let word = |letter: char| {
+                let value = line.split(' ').find_map(|word| word.strip_prefix(letter))?;
+                value.parse::<f64>().ok()
+            };
+            z = word('Z').unwrap_or(z);
+            let moves = word('R').is_some();
+            if moves && word('E').is_some_and(|fed| fed > 0.0) && heights.last() != Some(&z) {
+                heights.push(z);
+            }
+        }
+        heights
+    }
+
+    #[test]
+    fn flats_are_exact_in_the_text_of_the_program() {
+        let settings = Settings::defaults();
+        let model = mesh::stl::write(&shapes::steps());
+        let request = Request {
+            model: &model,
+            name: "steps",
+            wish: Wish { pose: Pose::Keep, ..Wish::default() },
+            settings: &settings,
+            job: &job(&[]),
+            made_at: "now",
+        };
+        let mut text = Vec::new();
+        let watch = &mut Watch { progress: &mut Silent, interrupt: &Interrupt::default() };
+        let outcome = slice(&request, &mut text, watch).unwrap();
+        let heights = printed_heights(std::str::from_utf8(&text).unwrap());
+        assert_eq!(heights.len(), outcome.layout.levels.len());
+        for flat in [3.07, 7.33, 11.9, 15.0] {
+            assert!(heights.contains(&flat), "{flat} in {heights:?}");
+        }
+        assert_eq!(heights.last(), Some(&15.0));
     }
 
     #[test]

@@ -37,6 +37,7 @@ pub mod check;
 pub mod clock;
 pub mod commands;
 pub mod convert;
+pub mod estimate;
 pub mod failure;
 pub mod input;
 pub mod interrupt;

@@ -98,7 +98,7 @@ pub fn slice(
     drop(soup);
     let repair_ms = clock.lap();
     watch.progress.stage("orient", 1);
-    let placed = place(&solid, &request.wish, &job.orient);
+    let placed = place(&solid, &request.wish, &job.orient)?;
     let fit = check_envelope(&placed, job)?;
     let mut warnings: Vec<Warning> = health.notes.iter().map(warning).collect();
     warnings.extend(placement_warnings(&solid, &placed, fit, job));

@@ -2,7 +2,7 @@
 
 use mesh::measure;
 use mesh::mesh::Mesh;
-use mesh::orient::{OrientParams, Rest, rest};
+use mesh::orient::{OrientParams, Rest, candidates, laid, rest};
 use mesh::place::{Placement, footprint, reference_azimuth};
 use mesh::topology::Solid;
 use nalgebra::{Point2, Rotation3, Vector3};
@@ -15,6 +15,8 @@ use crate::settings::Job;
 pub enum Pose {
     /// On its largest flat face.
     Flat,
+    /// By its place in the list of `rhumb orient`, counted from 1.
+    Ranked(usize),
     /// As it is.
     Keep,
     /// Turned about x, then y, then z, radians.
@@ -39,7 +41,7 @@ impl Default for Wish {
 }
 
 impl Pose {
-    /// Reads `flat`, `keep` or three angles in degrees.
+    /// Reads `flat`, `keep`, a rank or three angles in degrees.
     ///
     /// # Errors
     ///
@@ -48,12 +50,17 @@ impl Pose {
         match text {
             "flat" => Ok(Self::Flat),
             "keep" => Ok(Self::Keep),
+            _ if text.bytes().all(|b| b.is_ascii_digit()) => {
+                text.parse().ok().filter(|rank| *rank > 0).map(Self::Ranked).ok_or_else(|| {
+                    Failure::new("Usage", format!("--orient {text:?}: ranks count from 1"))
+                })
+            }
             _ => numbers::<3>(text)
                 .map(|angles| Self::Turned(angles.map(f64::to_radians)))
                 .ok_or_else(|| {
                     Failure::new(
                         "Usage",
-                        format!("--orient {text:?} is not flat, keep or RX,RY,RZ"),
+                        format!("--orient {text:?} is not flat, keep, a rank or RX,RY,RZ"),
                     )
                 }),
         }
@@ -96,12 +103,22 @@ pub struct Placed {
 }
 
 /// Lays a solid down and puts it in its place.
-#[must_use]
-pub fn place(solid: &Solid, wish: &Wish, orient: &OrientParams) -> Placed {
+///
+/// # Errors
+///
+/// `Usage` for a rank that the list of candidates does not have.
+pub fn place(solid: &Solid, wish: &Wish, orient: &OrientParams) -> Result<Placed, Failure> {
     let (rotation, rest) = match wish.pose {
         Pose::Flat => {
             let (rotation, rest) = rest(solid.mesh(), orient);
             (rotation, Some(rest))
+        }
+        Pose::Ranked(rank) => {
+            let ranked = candidates(solid.mesh(), orient);
+            let Some(candidate) = ranked.get(rank.wrapping_sub(1)) else {
+                return Err(no_such_rank(rank, ranked.len()));
+            };
+            (laid(solid.mesh(), candidate), Some(Rest::Flat(*candidate)))
         }
         Pose::Keep => (Rotation3::identity(), None),
         // nalgebra takes roll, pitch and yaw in this very order: about x, then y, then z.
@@ -112,7 +129,12 @@ pub fn place(solid: &Solid, wish: &Wish, orient: &OrientParams) -> Placed {
     placement.shift += Vector3::new(wish.centre.x, wish.centre.y, 0.0);
     let solid = solid.moved(|p| placement.point(p));
     let reach = solid.mesh().vertices.iter().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
-    Placed { solid, placement, rest, azimuth, reach }
+    Ok(Placed { solid, placement, rest, azimuth, reach })
+}
+
+fn no_such_rank(rank: usize, count: usize) -> Failure {
+    Failure::new("Usage", format!("--orient {rank}: the model has {count} ways to lie"))
+        .hint("rhumb orient lists them")
 }
 
 /// The nearest angle that a program can say exactly (0.0001°): the program of a part that is turned
@@ -240,15 +262,30 @@ mod tests {
     }
 
     fn placed(mesh: Mesh, wish: &Wish) -> Placed {
-        place(&Solid::new(mesh), wish, &job().orient)
+        place(&Solid::new(mesh), wish, &job().orient).unwrap()
+    }
+
+    #[test]
+    fn ranks_are_those_of_the_list() {
+        let mesh = shapes::block(10.0, 20.0, 30.0);
+        let heights = [1, 3, 5].map(|rank| {
+            let wish = Wish { pose: Pose::Ranked(rank), ..Wish::default() };
+            placed(mesh.clone(), &wish).solid.mesh().bounds().max.z
+        });
+        assert_eq!(heights, [10.0, 20.0, 30.0]);
+        let wish = Wish { pose: Pose::Ranked(7), ..Wish::default() };
+        let missing = place(&Solid::new(mesh), &wish, &job().orient).map(|_| ()).unwrap_err();
+        assert_eq!(missing.class(), "Usage");
+        assert!(missing.to_string().contains("6 ways"), "{missing}");
     }
 
     #[test]
     fn poses_are_read() {
         assert_eq!(Pose::parse("flat").unwrap(), Pose::Flat);
+        assert_eq!(Pose::parse("3").unwrap(), Pose::Ranked(3));
         let Pose::Turned(angles) = Pose::parse("90, 0,-45").unwrap() else { panic!("turned") };
         assert!((angles[0] - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
-        for bad in ["up", "1,2", "1,2,3,4", "1,2,nan", ""] {
+        for bad in ["up", "1,2", "1,2,3,4", "1,2,nan", "", "0", "-1", "99999999999999999999"] {
             assert_eq!(Pose::parse(bad).unwrap_err().class(), "Usage", "{bad}");
         }
         assert_eq!(parse_centre("3,-4").unwrap(), Point2::new(3.0, -4.0));
