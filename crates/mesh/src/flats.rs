@@ -61,8 +61,10 @@ struct Level {
 /// The cost is one pass over the facets and a sort of those that are nearly horizontal.
 #[must_use]
 pub fn flats(mesh: &Mesh, params: &FlatParams) -> Vec<Flat> {
+    let cosine = params.angle_rad.cos();
     let facets = (0..mesh.triangles.len() as u32).into_par_iter();
-    let mut facets: Vec<Level> = facets.filter_map(|facet| level(mesh, facet, params)).collect();
+    let level = |facet| level(mesh, facet, cosine, params.depth_mm);
+    let mut facets: Vec<Level> = facets.filter_map(level).collect();
     // All of the key, so that sums do not depend on the order of the facets.
     facets.par_sort_unstable_by(|a, b| {
         a.facing.cmp(&b.facing).then(a.z.total_cmp(&b.z)).then(a.area.total_cmp(&b.area))
@@ -75,17 +77,18 @@ pub fn flats(mesh: &Mesh, params: &FlatParams) -> Vec<Flat> {
 }
 
 /// A facet that is nearly horizontal; `None` for others.
-fn level(mesh: &Mesh, facet: u32, params: &FlatParams) -> Option<Level> {
-    let twice = mesh.area_vector(facet);
+fn level(mesh: &Mesh, facet: u32, cosine: f64, depth: f64) -> Option<Level> {
+    let corners = mesh.corners(facet);
+    let [a, b, c] = corners.map(|p| p.z);
+    // Most facets leave here.
+    if a.max(b).max(c) - a.min(b).min(c) > 2.0 * depth {
+        return None;
+    }
+    let twice = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
     let area = twice.norm() / 2.0;
-    let heights = mesh.corners(facet).map(|p| p.z);
-    let least = heights.iter().copied().fold(f64::INFINITY, f64::min);
-    let greatest = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let is_level = twice.z.abs() >= 2.0 * area * params.angle_rad.cos()
-        && greatest - least <= 2.0 * params.depth_mm
-        && area > 0.0;
     let facing = if twice.z < 0.0 { Facing::Down } else { Facing::Up };
-    is_level.then(|| Level { z: heights.iter().sum::<f64>() / 3.0, area, facing })
+    let is_level = area > 0.0 && twice.z.abs() >= 2.0 * area * cosine;
+    is_level.then(|| Level { z: (a + b + c) / 3.0, area, facing })
 }
 
 /// The face in a run of facets, by height, without gaps larger than the depth.

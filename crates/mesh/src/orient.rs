@@ -92,6 +92,10 @@ const SAME_ANGLE_RAD: f64 = 1e-6;
 /// A facet lies on the bed when its corners are this near to it, as a share of the diagonal.
 const BED_SHARE: f64 = 1e-4;
 
+/// Facets of one piece of work. Pieces are added up in their order: sums do not depend on the
+/// number of threads.
+const PIECE: usize = 1 << 16;
+
 /// How many classes are offered to the user.
 const MOST_CLASSES: usize = 8;
 
@@ -243,23 +247,32 @@ impl Side {
         depth_share: f64,
     ) -> Self {
         let depth = |p: &Point3<f64>| p.coords.dot(down);
-        let (mut top, mut bed) = (f64::INFINITY, f64::NEG_INFINITY);
-        for p in &mesh.vertices {
-            top = top.min(depth(p));
-            bed = bed.max(depth(p));
-        }
+        let none = || (f64::INFINITY, f64::NEG_INFINITY);
+        let reach = mesh.vertices.par_iter().map(|p| (depth(p), depth(p)));
+        let (top, bed) = reach.reduce(none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
         let near_bed = bed - depth_share * faces.diagonal;
         let of_class = params.class_tolerance_rad.cos();
         let steep = params.overhang_rad.sin() + SAME_SHARE;
+        let piece = |(k, normals): (usize, &[Vector3<f64>])| {
+            let (mut on_bed, mut overhang) = (0.0, 0.0);
+            for (t, normal) in (k * PIECE..).zip(normals) {
+                let facing = normal.dot(down);
+                let stands = || mesh.corners(t as u32).iter().all(|p| depth(p) >= near_bed);
+                if facing >= of_class && stands() {
+                    on_bed += faces.areas_mm2[t];
+                } else if facing > steep {
+                    overhang += faces.areas_mm2[t];
+                }
+            }
+            (on_bed, overhang)
+        };
+        let pieces: Vec<(f64, f64)> =
+            faces.normals.par_chunks(PIECE).enumerate().map(piece).collect();
         let height_mm = if mesh.vertices.is_empty() { 0.0 } else { bed - top };
         let mut side = Self { area_mm2: 0.0, overhang_area_mm2: 0.0, height_mm };
-        for (t, (normal, area)) in (0..).zip(faces.normals.iter().zip(&faces.areas_mm2)) {
-            let facing = normal.dot(down);
-            if facing >= of_class && mesh.corners(t).iter().all(|p| depth(p) >= near_bed) {
-                side.area_mm2 += area;
-            } else if facing > steep {
-                side.overhang_area_mm2 += area;
-            }
+        for (on_bed, overhang) in pieces {
+            side.area_mm2 += on_bed;
+            side.overhang_area_mm2 += overhang;
         }
         side
     }

@@ -37,13 +37,12 @@ pub(super) struct Faces {
 impl Faces {
     pub(super) fn of(mesh: &Mesh) -> Self {
         let n = mesh.triangles.len() as u32;
-        let (normals, areas_mm2): (Vec<_>, Vec<_>) = (0..n)
-            .into_par_iter()
-            .map(|t| {
-                let twice = mesh.area_vector(t);
-                (twice.try_normalize(0.0).unwrap_or_default(), twice.norm() / 2.0)
-            })
-            .unzip();
+        let (mut normals, mut areas_mm2) = (Vec::new(), Vec::new());
+        let facets = (0..n).into_par_iter().map(|t| {
+            let twice = mesh.area_vector(t);
+            (twice.try_normalize(0.0).unwrap_or_default(), twice.norm() / 2.0)
+        });
+        facets.unzip_into_vecs(&mut normals, &mut areas_mm2);
         let total_mm2 = areas_mm2.iter().sum();
         Self { normals, areas_mm2, total_mm2, diagonal: mesh.bounds().diagonal() }
     }
@@ -84,18 +83,24 @@ struct Grid {
     cells: Vec<(Key, std::ops::Range<usize>)>,
 }
 
-/// The place of a cell.
-type Key = [i32; 3];
+/// The place of a cell, its three coordinates in one number: a mesh of millions is sorted by it.
+type Key = u64;
+
+/// The key of facets without a direction; they come last.
+const NOWHERE: Key = Key::MAX;
 
 impl Grid {
     fn new(faces: &Faces, tolerance_rad: f64) -> Self {
         let cell_size = 2.0 * (tolerance_rad / 2.0).sin();
-        let mut keyed: Vec<(Key, u32)> = (0..faces.normals.len() as u32)
-            .into_par_iter()
-            .filter(|t| faces.normals[*t as usize] != Vector3::zeros())
-            .map(|t| (key(&folded(&faces.normals[t as usize]), cell_size), t))
+        let normals = faces.normals.par_iter().zip(0_u32..faces.normals.len() as u32);
+        let mut keyed: Vec<(Key, u32)> = normals
+            .map(|(normal, t)| match *normal == Vector3::zeros() {
+                true => (NOWHERE, t),
+                false => (key(place(&folded(normal), cell_size)), t),
+            })
             .collect();
         keyed.par_sort_unstable();
+        keyed.truncate(keyed.partition_point(|(key, _)| *key != NOWHERE));
         let mut cells = Vec::new();
         let mut start = 0;
         for run in keyed.chunk_by(|a, b| a.0 == b.0) {
@@ -180,10 +185,10 @@ impl Grid {
         let length = direction.norm();
         let mut cells = Vec::with_capacity(54);
         for way in [1.0, -1.0] {
-            let centre = key(&(direction * (way / length)), self.cell_size);
+            let centre = place(&(direction * (way / length)), self.cell_size);
             for i in 0..27 {
                 let offset = [i / 3 / 3 - 1, i / 3 % 3 - 1, i % 3 - 1];
-                let near = [0, 1, 2].map(|k| centre[k] + offset[k]);
+                let near = key([0, 1, 2].map(|k| centre[k] + offset[k]));
                 cells.extend(self.cells.binary_search_by_key(&near, |cell| cell.0));
             }
         }
@@ -193,9 +198,19 @@ impl Grid {
     }
 }
 
-fn key(direction: &Vector3<f64>, cell_size: f64) -> Key {
-    // Tolerances are some thousandths at least: the quotient is far from the end of i32.
-    [0, 1, 2].map(|k| (direction[k] / cell_size).round() as i32)
+/// The coordinates of the cell of a direction.
+fn place(direction: &Vector3<f64>, cell_size: f64) -> [i32; 3] {
+    // Tolerances are some ten-thousandths at least; coordinates must fit a third of a key.
+    let farthest = f64::from(HALF - 2);
+    [0, 1, 2].map(|k| (direction[k] / cell_size).round().clamp(-farthest, farthest) as i32)
+}
+
+/// Half the range of a coordinate in a key.
+const HALF: i32 = 1 << 20;
+
+/// Keys have the order of the coordinates.
+fn key(place: [i32; 3]) -> Key {
+    place.into_iter().fold(0, |key, k| key << 21 | u64::from((k + HALF) as u32))
 }
 
 /// The one of a direction and its opposite with z > 0, or y > 0, or x > 0.

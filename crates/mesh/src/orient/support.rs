@@ -14,7 +14,9 @@
 //! nothing, and a very large facet counts wholly or not at all. Islands, which begin in mid-air on
 //! facets that hang over by less, are not seen.
 
-use super::{BED_SHARE, Candidate, OrientParams, SAME_ANGLE_RAD, SAME_SHARE, part_from_model};
+use super::{
+    BED_SHARE, Candidate, OrientParams, PIECE, SAME_ANGLE_RAD, SAME_SHARE, part_from_model,
+};
 use crate::mesh::Mesh;
 use crate::place::Placement;
 use nalgebra::Point3;
@@ -34,10 +36,6 @@ const SPHERES: usize = 33;
 /// (no layer leans by more than 45°), and that of each other this much deeper. The last is 256
 /// times as deep: its layers lean by 0.2°.
 const SPHERE_RATIO: f64 = 1.189_207_115_002_721;
-
-/// Facets of one piece of work. The pieces are added up in their order: sums do not depend on the
-/// number of threads.
-const PIECE: usize = 1 << 16;
 
 /// How much of a pose hangs over, and what an estimate of its time needs. Areas mm².
 #[derive(Debug, Clone, Copy, PartialEq)]

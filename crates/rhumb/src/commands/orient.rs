@@ -120,7 +120,7 @@ fn as_text(choices: &[Choice]) -> String {
     out.push_str(
         "* is what --orient flat takes; --orient RANK takes another. In brackets: the angle of the \
          best cones (above 0 they slope down outwards) and the height of the best spheres' \
-         centre.\nTimes are estimates without travel, for comparison.\n",
+         centre.\nTimes are estimates, for comparison.\n",
     );
     out
 }
