@@ -129,6 +129,24 @@ fn what_cannot_be_printed_is_status_5() {
 }
 
 #[test]
+fn a_skirt_alone_is_no_print() {
+    let paper = mesh::stl::write(&mesh::shapes::block(20.0, 0.01, 20.0));
+    refused("paper.stl", &paper, &["--orient", "keep"], "NothingToPrint", 5);
+}
+
+#[test]
+fn a_part_of_exactly_the_size_of_the_machine_is_printed() {
+    let scratch = Scratch::new();
+    let disc = mesh::shapes::revolved(&[[0.0, 0.0], [120.0, 0.0], [120.0, 0.4], [0.0, 0.4]], 90);
+    scratch.file("disc.stl", mesh::stl::write(&disc));
+    let ran = scratch.run(&["slice", "disc.stl", "--json", "--set", "skirts=0"]).expect(0);
+    assert!(ran.out.contains("AtEnvelope"), "{}", ran.out);
+    let tall = mesh::stl::write(&mesh::shapes::block(8.0, 8.0, 200.0));
+    scratch.file("tall.stl", tall);
+    scratch.run(&["slice", "tall.stl", "--orient", "keep"]).expect(0);
+}
+
+#[test]
 fn outputs_that_cannot_be_written_are_status_7() {
     let scratch = Scratch::new();
     scratch.cube("cube.stl", 5.0);

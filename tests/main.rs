@@ -8,6 +8,7 @@
 
 mod bundled;
 mod cli;
+mod corpus;
 mod golden;
 mod house;
 mod interrupt;
@@ -18,6 +19,7 @@ mod rotation;
 mod roundtrip;
 mod run;
 mod settings;
+mod shared;
 mod slice;
 mod text;
 mod threads;

@@ -72,6 +72,13 @@ impl Totals {
     pub fn extruded(&self) -> f64 {
         self.volume.iter().sum()
     }
+
+    /// Returns the volume laid of the part itself, without skirt and brim, mm³.
+    #[must_use]
+    pub fn part(&self) -> f64 {
+        let roles = Role::ALL.iter().zip(&self.volume);
+        roles.filter(|(role, _)| **role != Role::SkirtBrim).map(|(_, volume)| volume).sum()
+    }
 }
 
 /// Why a layer cannot be planned.

@@ -247,7 +247,7 @@ fn layers(
     text.leave_part();
     write(text, &steps)?;
     printed.totals = totals;
-    if printed.totals.extruded() <= 0.0 {
+    if printed.totals.part() <= 0.0 {
         return Err(nothing_to_print(count, job));
     }
     Ok(printed)

@@ -146,6 +146,10 @@ fn whole_places(radians: f64) -> f64 {
 /// Share of the rail's end within which a part counts as being at it.
 const NEARLY_MM: f64 = 0.5;
 
+/// How far a part of exactly the machine's size may seem to stick out, mm: coordinates of an STL are
+/// good to 8 µm at 100 mm, and no wall is driven nearer to its outline than half a bead.
+const ROUNDING_MM: f64 = 0.01;
+
 /// What fits in the machine, and what nearly does not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fit {
@@ -165,8 +169,8 @@ pub fn check_envelope(placed: &Placed, job: &Job) -> Result<Fit, Failure> {
     let (reach, height) = (placed.reach, size.z);
     let (most_reach, most_height) = (job.printer.rail.max, job.printer.lift.max);
     // Neither NaN nor infinity may pass.
-    if !(reach <= most_reach && height <= most_height) {
-        let what = if reach <= most_reach {
+    if !(reach <= most_reach + ROUNDING_MM && height <= most_height + ROUNDING_MM) {
+        let what = if reach <= most_reach + ROUNDING_MM {
             format!("the part is {height:.1} mm tall; the lift reaches {most_height} mm")
         } else {
             format!(
