@@ -41,7 +41,7 @@ fn wrong_usage_is_status_2() {
         &["slize", "cube.stl"],
         &["slice", "cube.stl", "--nonsense"],
         &["slice", "cube.stl", "--threads", "0"],
-        &["slice", "cube.stl", "--layers", "spherical-ish"],
+        &["slice", "cube.stl", "--units", "furlong"],
     ];
     for arguments in wrong {
         let ran = scratch.run(arguments).expect(2);

@@ -80,7 +80,8 @@ fn every_line_keeps_the_contract() {
 
 #[test]
 fn layers_are_announced_as_viewers_read_them() {
-    let text = sliced("steps", &["--set", "first_layer_height_mm=0.3", "--set", "snap=off"]);
+    // 15.3 mm tall: a first layer of 0.3 mm and 75 of 0.2 mm.
+    let text = sliced("cube", &["--scale", "0.765", "--set", "first_layer_height_mm=0.3"]);
     let lines: Vec<&str> = text.lines().collect();
     let starts: Vec<usize> = (0..lines.len()).filter(|&i| lines[i] == ";LAYER_CHANGE").collect();
     for (number, &start) in starts.iter().enumerate() {
@@ -97,9 +98,8 @@ fn layers_are_announced_as_viewers_read_them() {
         ];
         assert_eq!(&lines[start + 1..start + 8], wanted);
     }
-    // The part is 15 mm tall.
-    assert_eq!(starts.len(), 74);
-    assert!(lines.contains(&"; num_layers = 74") && lines.contains(&"; total layers count = 74"));
+    assert_eq!(starts.len(), 76);
+    assert!(lines.contains(&"; num_layers = 76") && lines.contains(&"; total layers count = 76"));
     // What is laid lies on the level that was announced.
     for motion in motions(&text).iter().filter(|motion| motion.lays()) {
         let z = 0.3 + 0.2 * motion.layer.unwrap() as f64;
