@@ -9,7 +9,7 @@ use mesh::mesh::Mesh;
 use mesh::shapes;
 use mesh::topology::Solid;
 use nalgebra::{Rotation3, Vector3};
-use slicer::level::{Level, ScheduleParams, schedule};
+use slicer::level::Level;
 use slicer::section::{Cutter, Section, Tears};
 use slicer::surface::Plane;
 
@@ -59,8 +59,10 @@ fn layers_add_up_to_the_volume_and_every_outline_closes() {
         // Layers that end exactly at the top.
         let count = (top / 0.1).ceil();
         let height = top / count;
-        let levels =
-            schedule(top, &ScheduleParams { first_layer_height: height, layer_height: height });
+        let bound = |i: usize| height * i as f64;
+        let levels: Vec<Level> = (0..count as usize)
+            .map(|index| Level { index, lower: bound(index), upper: bound(index + 1) })
+            .collect();
         let sections = cut(&mesh, &levels);
         for section in &sections {
             section.region.check();
