@@ -71,7 +71,13 @@ fn lines_are_cut_as_often_as_published() {
         let eps = number(case, "eps");
         let params = ResampleParams { chord: eps, travel_chord: eps, dialect: POLAR, azimuth: 0.0 };
         let mut resampler = Resampler::new(&printer(alignment(model), point("p0")), params);
-        let stroke = Stroke { kind: Kind::Print, to: point("p1"), filament: 1.0, speed: 50.0 };
+        let stroke = Stroke {
+            kind: Kind::Print,
+            to: point("p1"),
+            filament: 1.0,
+            speed: 50.0,
+            continues: false,
+        };
         let legs = resampler.legs(&[stroke]).unwrap();
         let (count, published) = (legs[0].len() as f64, number(case, "count"));
         // Positions are rounded to a thousandth, a tenth of some tolerances here: a piece that is

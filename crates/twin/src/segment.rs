@@ -37,6 +37,8 @@ pub struct Segment {
     pub joints: Option<[Joints; 2]>,
     /// Where the nozzle is in the part at both ends, mm.
     pub part: [Point3<f64>; 2],
+    /// Where it is halfway, mm: on an arc, far from the middle of the chord.
+    pub middle: Point3<f64>,
     /// The path over the bed.
     pub curve: Curve,
     /// The length of the path over the part, lift included, mm.

@@ -79,7 +79,7 @@ impl Deposit {
         if self.seen.is_multiple_of(self.every) {
             self.samples.push(Sample {
                 line: segment.line,
-                middle: nalgebra::center(from, to),
+                middle: segment.middle,
                 side: Vector2::new(-along.y, along.x) / length,
                 half_width: segment.width / 2.0,
             });
