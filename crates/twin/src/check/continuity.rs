@@ -106,16 +106,14 @@ impl Continuity {
     }
 
     fn jump(&mut self, segment: &Segment, findings: &mut Findings) {
-        if segment.bed_change().abs() <= ARC {
-            return;
-        }
         let bound = segment.curve.deviation_bound();
         if bound <= self.worst_deviation && bound <= JUMP {
             return;
         }
         let deviation = segment.curve.deviation(NEAR_AXIS);
         self.worst_deviation = self.worst_deviation.max(deviation);
-        if exceeds(deviation, JUMP) || bound.is_nan() {
+        let is_arc = segment.bed_change().abs() <= ARC;
+        if (exceeds(deviation, JUMP) && !is_arc) || bound.is_nan() {
             findings.error(NAME, Place::end_of(segment), (deviation, JUMP), || {
                 format!(
                     "a line that lays material bows {deviation:.3} mm from straight, at most \

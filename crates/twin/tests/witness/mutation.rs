@@ -115,7 +115,7 @@ const PART: [Mutation; 17] = [
         let at = wall(lines);
         word(lines, at, 'T', |t| t - 360.0);
     }),
-    ("continuity", |lines| {
+    ("deposit", |lines| {
         let at = wall(lines);
         word(lines, at, 'R', |r| r + 1.5);
         word(lines, at, 'T', |t| t + 9.0);
