@@ -555,6 +555,10 @@ M84
 ; axis_clearance = 0.02
 ; moves_per_second = 500
 ; nozzle_diameter = 0.4
+; nozzle_flat_radius = 0.3
+; nozzle_half_angle = 15
+; nozzle_block_height = 30
+; nozzle_block_radius = 20
 ; min_layer_height = 0.04
 ; max_layer_height = 0.32
 ; max_nozzle_temperature = 280
@@ -581,6 +585,7 @@ M84
 ; min_print_speed = 10
 ; layers = planar
 ; cone_angle = 30
+; cone_angle_max = 0
 ; sphere_centre = -60
 ; cap_radius = 100
 ; base_layers = 2

@@ -9,6 +9,7 @@
 mod bundled;
 mod cli;
 mod corpus;
+mod curved;
 mod golden;
 mod house;
 mod interrupt;

@@ -177,8 +177,9 @@ pub struct LayerArguments {
     /// The surface that layers follow
     #[arg(long, value_name = "KIND", value_parser = ["planar", "conical", "spherical", "caps"])]
     pub layers: Option<String>,
-    /// Slope of conical layers; positive when they fall outwards, negative for bowls
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    /// Slope of conical layers; positive when they fall outwards, negative for bowls; `max` for the
+    /// steepest that the nozzle clears
+    #[arg(long, value_name = "DEG|max", allow_hyphen_values = true)]
     pub cone_angle: Option<String>,
     /// Height of the centre of spherical layers, mm, at or below the bed
     #[arg(long, value_name = "Z", allow_hyphen_values = true)]
@@ -199,7 +200,12 @@ impl LayerArguments {
             ("cap_radius_mm", &self.cap_radius),
         ]
         .into_iter()
-        .filter_map(|(key, value)| value.as_ref().map(|value| format!("{key}={value}")))
+        .filter_map(|(key, value)| value.as_ref().map(|value| (key, value.as_str())))
+        .flat_map(|(key, value)| match (key, value) {
+            ("cone_angle_deg", "max") => vec![format!("{key}=75"), "cone_angle_max=true".into()],
+            ("cone_angle_deg", "-max") => vec![format!("{key}=-75"), "cone_angle_max=true".into()],
+            _ => vec![format!("{key}={value}")],
+        })
         .collect()
     }
 }

@@ -43,6 +43,7 @@ pub mod input;
 pub mod interrupt;
 pub mod levels;
 pub mod output;
+pub mod overhang;
 pub mod pipeline;
 pub mod place;
 pub mod program_text;

@@ -25,13 +25,14 @@ use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::levels::Layout;
 use crate::output;
+use crate::overhang::{Overhang, overhangs};
 use crate::place::{Fit, Placed, Wish, check_envelope, place, suspect_units};
 use crate::program_text;
 use crate::progress::Progress;
 use crate::report::{Timings, Warning};
 use crate::settings::{Job, Settings};
 use crate::stack::Stack;
-use crate::stages::{Stage, stages};
+use crate::stages::{LayerKind, Stage, stages};
 use crate::stopwatch::Stopwatch;
 
 /// What to slice and how.
@@ -66,6 +67,12 @@ pub struct Outcome {
     pub placed: Placed,
     /// The layers, and the flat faces that they meet.
     pub layout: Layout,
+    /// The surface that they follow.
+    pub layers: LayerKind,
+    /// Their thickness along the normal, mm.
+    pub heights: Vec<f64>,
+    /// What hangs over, when layers are curved.
+    pub overhang: Option<Overhang>,
     /// The sums of the program.
     pub totals: Totals,
     /// Area that no bead fits in.
@@ -105,8 +112,13 @@ pub fn slice(
     drop(solid);
     let orient_ms = clock.lap();
 
-    let (stages, mut layout) = stages(placed.solid.mesh(), job)?;
+    let (stages, mut layout) = stages(&placed.solid, job)?;
     warnings.extend(layout.warnings(job.schedule.snap));
+    let overhang = stages
+        .last()
+        .filter(|stage| stage.kind != LayerKind::Planar)
+        .map(|stage| overhangs(placed.solid.mesh(), &*stage.surface, job.orient.overhang_rad));
+    let layers_kind = stages.last().map_or(LayerKind::Planar, |stage| stage.kind);
     let schedule_ms = clock.lap();
     // The slicer works in a frame that turns with the part, so that its choices do too.
     let turned = Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), -placed.azimuth);
@@ -135,8 +147,19 @@ pub fn slice(
         slice: clock.lap(),
         ..Timings::default()
     };
-    let Printed { totals, lost, .. } = printed;
-    Ok(Outcome { health, placed, layout, totals, lost, warnings, timings })
+    let Printed { totals, lost, heights, .. } = printed;
+    Ok(Outcome {
+        health,
+        placed,
+        layout,
+        layers: layers_kind,
+        heights,
+        overhang,
+        totals,
+        lost,
+        warnings,
+        timings,
+    })
 }
 
 fn unusable(class: &'static str, error: &dyn std::error::Error, hint: Option<String>) -> Failure {
@@ -202,6 +225,8 @@ struct Printed {
     adhesion_out_of_reach: usize,
     /// The layers that were printed.
     levels: Vec<Level>,
+    /// Their thickness along the normal, mm.
+    heights: Vec<f64>,
 }
 
 fn layers(
@@ -283,6 +308,7 @@ impl Printed {
     fn count(&mut self, filled: &Filled, level: &Level) {
         let index = self.levels.len();
         self.levels.push(Level { index, ..*level });
+        self.heights.push(filled.paths.thickness);
         let lost = &filled.paths.lost;
         self.lost.area += lost.area;
         self.lost_volume += lost.area * level.thickness();

@@ -98,6 +98,12 @@ pub struct Layers {
     pub flats: Vec<Flat>,
     /// Area too thin for any bead, summed over the layers.
     pub lost_mm2: f64,
+    /// Area that hangs over with planar layers; only for curved ones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub overhang_planar_mm2: Option<f64>,
+    /// Area that hangs over with these layers; only for curved ones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub overhang_mm2: Option<f64>,
 }
 
 /// A flat face.

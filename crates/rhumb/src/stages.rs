@@ -10,7 +10,9 @@
 use std::ops::Range;
 
 use mesh::mesh::Mesh;
+use mesh::topology::Solid;
 use nalgebra::Point3;
+use slicer::clearance::{LayerOrder, Uphill, steepest_slope};
 use slicer::level::Level;
 use slicer::surface::{Caps, Cone, Extent, LayerSurface, Plane, Spheres, SurfaceError};
 
@@ -85,7 +87,8 @@ pub struct Stage {
 /// # Errors
 ///
 /// `LimitExceeded`, or `OutOfEnvelope` for a surface that does not fit the part.
-pub fn stages(part: &Mesh, job: &Job) -> Result<(Vec<Stage>, Layout), Failure> {
+pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure> {
+    let part = solid.mesh();
     let layout = levels::layout(part, &Plane, job)?;
     if job.layers == LayerKind::Planar {
         let levels = layout.levels.clone();
@@ -98,12 +101,53 @@ pub fn stages(part: &Mesh, job: &Job) -> Result<(Vec<Stage>, Layout), Failure> {
         };
         return Ok((vec![planar], layout));
     }
-    let surface = job.layers.surface().map_err(|error| unfit(&error))?;
+    let kind = within_clearance(solid, job)?;
+    let surface = kind.surface().map_err(|error| unfit(&error))?;
     surface.fits(&extent(part)).map_err(|error| unfit(&error))?;
     let base = base(job);
     let floor = base.printed.end.checked_sub(1).map_or(0.0, |last| base.levels[last].upper);
-    let curved = curved(part, surface, floor, job)?;
+    let curved = Stage { kind, ..curved(part, surface, floor, job)? };
     Ok((vec![base, curved], Layout { flats: Vec::new(), ..layout }))
+}
+
+/// How deep the nozzle may press into what is laid, mm: a quarter of a usual layer, which a soft
+/// bead gives way by.
+const GOUGE_MM: f64 = 0.05;
+
+/// Refuses layers too steep for the nozzle, or lowers a cone where the user asked for that.
+fn within_clearance(solid: &Solid, job: &Job) -> Result<LayerKind, Failure> {
+    let uphill = Uphill {
+        extent: extent(solid.mesh()).radius,
+        thickness: job.schedule.layer_height,
+        allowance: GOUGE_MM,
+        order: LayerOrder::LowToHigh,
+    };
+    let most = job.nozzle.steepest(&uphill);
+    if let (LayerKind::Conical(angle), true) = (job.layers, job.lower_cone) {
+        return Ok(LayerKind::Conical(most.min(angle.abs()).copysign(angle)));
+    }
+    let surface = job.layers.surface().map_err(|error| unfit(&error))?;
+    let slope = steepest_slope(solid, &*surface);
+    if slope <= most {
+        return Ok(job.layers);
+    }
+    let degrees = |angle: f64| machine::gcode::decimal(angle.to_degrees(), 1);
+    let (slope, most) = (degrees(slope), degrees(most));
+    Err(Failure::new(
+        "OutOfEnvelope",
+        format!(
+            "{} layers rise by {slope}° in this part, and the nozzle clears at most {most}°",
+            job.layers.word()
+        ),
+    )
+    .hint(match job.layers {
+        LayerKind::Conical(_) => format!(
+            "use --cone-angle max or up to {most}, or describe a slimmer nozzle in the printer \
+             profile (nozzle_flat_radius_mm, nozzle_half_angle_deg, nozzle_block_height_mm)"
+        ),
+        LayerKind::Spherical(_) => "lower the centre with --sphere-centre".into(),
+        LayerKind::Caps(_) | LayerKind::Planar => "use a larger --cap-radius".into(),
+    }))
 }
 
 fn unfit(error: &SurfaceError) -> Failure {

@@ -46,12 +46,14 @@ pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Jo
         },
         orientation: orientation(outcome, job),
         layers: Layers {
-            kind: "planar",
+            kind: outcome.layers.word(),
             count: outcome.layout.levels.len(),
             levels_mm: outcome.layout.levels.iter().map(|level| tidy(level.upper)).collect(),
-            heights_mm: outcome.layout.levels.iter().map(|level| tidy(level.thickness())).collect(),
+            heights_mm: outcome.heights.iter().map(|&height| tidy(height)).collect(),
             flats: outcome.layout.report(),
             lost_mm2: outcome.lost.area,
+            overhang_planar_mm2: outcome.overhang.map(|overhang| tidy(overhang.planar)),
+            overhang_mm2: outcome.overhang.map(|overhang| tidy(overhang.chosen)),
         },
         print: Print {
             time_s: totals.time,
@@ -128,6 +130,17 @@ pub fn text(
         ),
     );
     row("layers", format!("{} of {} mm", report.layers.count, heights(report, job)));
+    if let Some(overhang) = outcome.overhang {
+        row("surface", outcome.layers.describe());
+        row(
+            "overhang",
+            format!(
+                "{} mm², with planar layers {} mm²",
+                decimal(overhang.chosen, 0),
+                decimal(overhang.planar, 0)
+            ),
+        );
+    }
     if let Some(flats) = outcome.layout.summary() {
         row("flat faces", flats);
     }

@@ -101,13 +101,12 @@ impl<'a> Columns<'a> {
         for facet in 0..self.mesh.triangles.len() as u32 {
             let Some(corners) = corners(self.mesh, facet) else { continue };
             let [least, most] = extent(corners.iter().map(|p| p.y));
-            for row in index(1, least)..=index(1, most) {
+            // A shade more on every side: the last bits of a border must not decide.
+            let [slack, slack_y] = self.cell.map(|width| width * EDGE_SHARE);
+            for row in index(1, least - slack_y)..=index(1, most + slack_y) {
                 let low = self.corner.y + self.cell[1] * row as f64;
-                let Some([left, right]) = stretch(&corners, [low, low + self.cell[1]]) else {
-                    continue;
-                };
-                // One cell more on either side: the last bits of a stretch must not decide.
-                let slack = self.cell[0] * EDGE_SHARE;
+                let rows = [low - slack_y, low + self.cell[1] + slack_y];
+                let Some([left, right]) = stretch(&corners, rows) else { continue };
                 for column in index(0, left - slack)..=index(0, right + slack) {
                     see(row * self.count[0] + column, facet);
                 }

@@ -31,10 +31,6 @@ use crate::segment::Segment;
 
 /// What a line makes happen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "an event is looked at where it is made and never kept"
-)]
 pub enum Event {
     /// Nothing that a check looks at.
     Nothing,

@@ -16,6 +16,7 @@ use plan::resample::ResampleParams;
 use plan::route::{FilamentParams, Speeds};
 use plan::seam::SeamPosition;
 use slicer::adhesion::AdhesionParams;
+use slicer::clearance::NozzleProfile;
 use slicer::infill::{InfillParams, Pattern};
 use slicer::layer::PathParams;
 use slicer::level::adaptive::AdaptiveParams;
@@ -45,6 +46,10 @@ pub struct Job {
     pub least_flat_mm2: f64,
     /// The surface that layers follow.
     pub layers: LayerKind,
+    /// Whether a cone too steep for the nozzle is lowered.
+    pub lower_cone: bool,
+    /// The shape of the nozzle.
+    pub nozzle: NozzleProfile,
     /// Planar layers under curved ones.
     pub base_layers: usize,
     /// Where layers lie.
@@ -91,6 +96,13 @@ impl Job {
             },
             least_flat_mm2: get.number("flat_area_min_mm2"),
             layers: layers(&get),
+            lower_cone: get.switch("cone_angle_max"),
+            nozzle: NozzleProfile {
+                flat_radius: get.number("nozzle_flat_radius_mm"),
+                half_angle: get.number("nozzle_half_angle_deg").to_radians(),
+                block_height: get.number("nozzle_block_height_mm"),
+                block_radius: get.number("nozzle_block_radius_mm"),
+            },
             base_layers: get.count("base_layers"),
             schedule: schedule(&get)?,
             paths: paths(&get, &printer, &tolerances),
