@@ -4,6 +4,7 @@ use machine::calibration::Sighting;
 use machine::calibration::joint::{Magnet, Noise, Place, Problem, Unknowns, derivatives};
 use machine::calibration::pairing::{Pair, huber_mean, match_sides};
 use machine::calibration::peaks::{Chord, centroid, chord, log_gauss, threshold_midpoint};
+use machine::calibration::pins::{Artefact, Distance, Measure, evaluate};
 use machine::calibration::ring::{Drawing, find};
 use serde_json::Value;
 use std::f64::consts::TAU;
@@ -154,4 +155,23 @@ fn the_circle_of_a_digital_sensor() {
     near(circle.magnet_radius, number(case, "r0"), 1e-9, "r0");
     near(circle.switch_radius, number(case, "Rm"), 1e-9, "Rm");
     near(circle.s, number(case, "s0"), 1e-9, "s0");
+}
+
+#[test]
+fn printed_pins() {
+    let Some(all) = vectors() else { return };
+    let case = &all["print_and_measure"];
+    let artefact =
+        Artefact { outer: number(case, "L"), inner: number(case, "l"), ..Artefact::default() };
+    let distances = [
+        (Measure::Ahead, "D1"),
+        (Measure::Behind, "D2"),
+        (Measure::Outer, "D_outer"),
+        (Measure::Inner, "D_inner"),
+    ]
+    .map(|(of, key)| Distance { of, mm: number(case, key) });
+    let said = evaluate(&artefact, &distances, 0.03).unwrap();
+    near(said.a.value, number(case, "a"), 1e-9, "a");
+    near(said.b.value, number(case, "b"), 1e-9, "b");
+    near(said.shrinkage.value, number(case, "k"), 1e-9, "k");
 }

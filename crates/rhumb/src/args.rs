@@ -72,6 +72,9 @@ pub enum Command {
     Orient(Orient),
     /// Turn any slicer's Cartesian program into one for a polar printer
     Convert(Box<Convert>),
+    /// Find the true rotation centre and write it to a calibration file
+    #[command(subcommand)]
+    Calibrate(Box<Calibrate>),
     /// Read a program again and prove it on a model of the machine
     Verify(Verify),
     /// Draw a program
@@ -276,6 +279,71 @@ pub struct Convert {
     /// Which settings to use
     #[command(flatten)]
     pub settings: SettingsArguments,
+}
+
+/// Ways to a calibration.
+#[derive(Debug, Subcommand)]
+pub enum Calibrate {
+    /// Make a calibration file of a log of magnets
+    Fit(CalibrateFit),
+    /// Write the pins to print, or find the nozzle's own centre from their distances
+    Pins(CalibratePins),
+    /// Explain a calibration file, and draw what printing without it would miss
+    Show(CalibrateShow),
+}
+
+/// Arguments of `calibrate fit`.
+#[derive(Debug, Args)]
+pub struct CalibrateFit {
+    /// The log: located magnets, readings or switchings of a sensor; `-` reads standard input
+    pub log: PathBuf,
+    /// Where the calibration goes; `-` writes standard output [default: LOG.toml]
+    #[arg(short, long, value_name = "CAL.toml")]
+    pub output: Option<PathBuf>,
+    /// Draw the magnets and what they miss their places by
+    #[arg(long, value_name = "FILE.svg")]
+    pub picture: Option<PathBuf>,
+    /// A calibration that `calibrate pins` wrote: its distance from sensor to nozzle is taken off
+    #[arg(long, value_name = "CAL.toml")]
+    pub pins: Option<PathBuf>,
+}
+
+/// Arguments of `calibrate pins`.
+#[derive(Debug, Args)]
+pub struct CalibratePins {
+    /// What the caliper showed, CSV: from,to,over_mm,between_mm; without it the model is written
+    pub readings: Option<PathBuf>,
+    /// Where the calibration goes [default: READINGS.toml], or the model [default: pins.stl]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// The calibration that the pins were printed with
+    #[arg(long, value_name = "CAL.toml")]
+    pub calibration: Option<PathBuf>,
+    /// Radius on which the outer pins stand, mm
+    #[arg(long, value_name = "MM", default_value_t = 60.0)]
+    pub outer: f64,
+    /// Radius on which the inner pins stand, mm
+    #[arg(long, value_name = "MM", default_value_t = 15.0)]
+    pub inner: f64,
+    /// Radius of a pin, mm
+    #[arg(long, value_name = "MM", default_value_t = 3.0)]
+    pub pin: f64,
+    /// Standard deviation of one reading of the caliper, mm
+    #[arg(long, value_name = "MM", default_value_t = 0.03)]
+    pub caliper_sd: f64,
+}
+
+/// Arguments of `calibrate show`.
+#[derive(Debug, Args)]
+pub struct CalibrateShow {
+    /// The calibration
+    pub file: PathBuf,
+    /// Draw what printing without it would miss
+    #[arg(long, value_name = "FILE.svg")]
+    pub picture: Option<PathBuf>,
+    /// Radius of the bed, mm
+    #[arg(long, value_name = "MM", default_value_t = 100.0)]
+    pub radius: f64,
 }
 
 /// Arguments of `verify`.

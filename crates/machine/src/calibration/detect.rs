@@ -1,7 +1,7 @@
 //! The magnets in a log.
 //!
 //! A log is a sequence of scans: the bed turned while the carriage stood, or the carriage ran while
-//! the bed stood. Each passage over a magnet gives a [`Pass`], the middle of what the sensor saw and
+//! the bed stood. Each passage over a magnet gives the middle of what the sensor saw and
 //! its extent. Passes that overlap are of one magnet. Its place across the rail is the mean of the
 //! middles of both directions, so that play, delay and the sensor's hysteresis cancel; its place
 //! along the rail comes from scans of the carriage where there are any, else from how the passes of

@@ -14,6 +14,9 @@
 //! 6. [`fit`] puts it together and says what the data do **not** determine: from one side of the
 //!    axis alone a ring says nothing of `b`, however many magnets it has.
 //!
+//! The sensor does not sit exactly where the nozzle does. [`pins`] finds the nozzle's own centre from
+//! a print.
+//!
 //! Frames, signs and the model are those of [`kinematics`](crate::kinematics). Lengths are mm,
 //! angles radians. The source's own procedure, averages of the positions of a ring seen from one
 //! side, finds the plate's eccentricity only.
@@ -25,6 +28,7 @@ pub mod known;
 pub mod log;
 pub mod pairing;
 pub mod peaks;
+pub mod pins;
 pub mod ring;
 
 use nalgebra::Vector2;

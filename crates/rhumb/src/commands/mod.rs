@@ -1,5 +1,6 @@
 //! The commands, one a file. Each returns the exit status of a run that went through.
 
+mod calibrate;
 mod convert;
 mod inspect;
 mod model;
@@ -38,6 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         Command::Inspect(arguments) => inspect::run(arguments, manner),
         Command::Orient(arguments) => orient::run(arguments, manner),
         Command::Convert(arguments) => convert::run(arguments, manner),
+        Command::Calibrate(calibrate) => calibrate::run(calibrate, manner),
         Command::Verify(arguments) => verify::run(arguments, manner),
         Command::Preview(arguments) => preview::run(arguments),
         Command::Profile(profile) => profile::run(profile, manner),
