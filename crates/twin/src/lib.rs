@@ -9,7 +9,8 @@
 //! what is measured; [`family`] knows the surfaces of layers; [`section`] cuts the mesh, [`columns`]
 //! tells its inside, [`nearest`] how far away its surface is. The checks, one concept each, are in [`check`],
 //! what they find in [`finding`], the sums of a program in [`totals`]; [`verify`] runs it all over
-//! a program. [`picture`] draws what was replayed, so that a picture cannot lie.
+//! a program. [`picture`] draws what was replayed, so that a picture cannot lie. [`magnets`] is a
+//! machine with a sensor, for trying out a calibration.
 //!
 //! Lengths are mm, angles radians, times seconds, temperatures degrees Celsius. Frames: *Part*
 //! turns with the bed, *Machine* does not; both as in [`machine::kinematics`].
@@ -19,6 +20,7 @@ pub mod columns;
 pub mod curve;
 pub mod family;
 pub mod finding;
+pub mod magnets;
 pub mod nearest;
 pub mod picture;
 pub mod replay;

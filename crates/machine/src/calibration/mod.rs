@@ -14,6 +14,9 @@
 //! 6. [`fit`] puts it together and says what the data do **not** determine: from one side of the
 //!    axis alone a ring says nothing of `b`, however many magnets it has.
 //!
+//! [`scan`] does it all on a machine, through the small interface of [`rig`]; [`stepwise`] is the
+//! source's own search, for comparison.
+//!
 //! The sensor does not sit exactly where the nozzle does. [`pins`] finds the nozzle's own centre from
 //! a print.
 //!
@@ -29,7 +32,10 @@ pub mod log;
 pub mod pairing;
 pub mod peaks;
 pub mod pins;
+pub mod rig;
 pub mod ring;
+pub mod scan;
+pub mod stepwise;
 
 use nalgebra::Vector2;
 use std::f64::consts::{PI, TAU};
