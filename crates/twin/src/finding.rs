@@ -125,7 +125,8 @@ impl Findings {
         self.add(check, Severity::Warning, place, (measured, limit), what);
     }
 
-    fn add(
+    /// Adds a finding of this severity, with the place appended to the message.
+    pub(crate) fn add(
         &mut self,
         check: &'static str,
         severity: Severity,

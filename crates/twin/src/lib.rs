@@ -6,7 +6,8 @@
 //! In reading order: [`curve`] is the path of the nozzle over the part during one move, as
 //! forward kinematics gives it; [`segment`] is one move with all that is known of it; [`replay`]
 //! makes segments out of lines; [`rounding`] says how far the last places of the text can bend
-//! what is measured; [`section`] cuts the mesh. The checks, one concept each, are in [`check`],
+//! what is measured; [`family`] knows the surfaces of layers; [`section`] cuts the mesh, [`columns`]
+//! tells its inside, [`nearest`] how far away its surface is. The checks, one concept each, are in [`check`],
 //! what they find in [`finding`], the sums of a program in [`totals`]; [`verify`] runs it all over
 //! a program. [`picture`] draws what was replayed, so that a picture cannot lie.
 //!
@@ -14,8 +15,11 @@
 //! turns with the bed, *Machine* does not; both as in [`machine::kinematics`].
 
 pub mod check;
+pub mod columns;
 pub mod curve;
+pub mod family;
 pub mod finding;
+pub mod nearest;
 pub mod picture;
 pub mod replay;
 pub mod rounding;

@@ -26,6 +26,7 @@ use machine::program::{BedTurn, Feed, Joints, Role};
 use nalgebra::Point3;
 
 use crate::curve::Curve;
+use crate::family::Family;
 use crate::segment::Segment;
 
 /// What a line makes happen.
@@ -56,6 +57,8 @@ pub struct LayerMark {
     pub top: Option<f64>,
     /// Its thickness, mm, when it was announced.
     pub height: Option<f64>,
+    /// The surfaces that it belongs to, when they were announced; they are planar otherwise.
+    pub family: Option<Family>,
 }
 
 /// A temperature commanded.
@@ -96,6 +99,7 @@ pub struct Replay {
     layer: Option<usize>,
     top: Option<f64>,
     height: Option<f64>,
+    family: Option<Family>,
     role: Role,
     width: f64,
 }
@@ -117,6 +121,7 @@ impl Replay {
             layer: None,
             top: None,
             height: None,
+            family: None,
             role: Role::Custom,
             width: 0.0,
         }
@@ -291,8 +296,10 @@ impl Replay {
             self.height = number(height);
         } else if let Some(index) = comment.strip_prefix("LAYER:").and_then(|n| n.parse().ok()) {
             self.layer = Some(index);
-            let Self { line, top, height, .. } = *self;
-            return Event::Layer(LayerMark { line, index, top, height });
+            let Self { line, top, height, family, .. } = *self;
+            return Event::Layer(LayerMark { line, index, top, height, family });
+        } else if let Some(family) = Family::from_comment(comment) {
+            self.family = Some(family);
         }
         Event::Nothing
     }
@@ -402,7 +409,7 @@ mod tests {
         assert_eq!(replay.line("M117 Layer 3: R12 T"), Ok(Event::Nothing));
         assert_eq!(replay.line("G28"), Ok(Event::Rest));
         assert_eq!(replay.line(";Z:0.4"), Ok(Event::Nothing));
-        let mark = LayerMark { line: 6, index: 7, top: Some(0.4), height: None };
+        let mark = LayerMark { line: 6, index: 7, top: Some(0.4), height: None, family: None };
         assert_eq!(replay.line(";LAYER:7"), Ok(Event::Layer(mark)));
         assert!(replay.line("G1 R").is_err());
         assert_eq!((replay.lines(), replay.layer()), (7, Some(7)));

@@ -156,6 +156,16 @@ pub fn volume(mesh: &Mesh) -> f64 {
     six_times / 6.0
 }
 
+/// Returns the area of the facets, mm².
+#[must_use]
+pub fn surface(mesh: &Mesh) -> f64 {
+    let twice = mesh.triangles.iter().filter_map(|corners| {
+        let [a, b, c] = corners_of(mesh, corners)?;
+        Some((b - a).cross(&(c - a)).norm())
+    });
+    0.5 * twice.sum::<f64>()
+}
+
 /// The corners of a facet; `None` when it names no vertex or is not finite.
 fn corners_of(mesh: &Mesh, corners: &[u32; 3]) -> Option<[Point3<f64>; 3]> {
     let corner = |k: usize| mesh.vertices.get(corners[k] as usize).copied();

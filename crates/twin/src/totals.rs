@@ -53,6 +53,8 @@ pub struct Totals {
     pub deviation: f64,
     /// Least distance from the axis, mm; infinite without motion.
     pub nearest_to_axis: f64,
+    /// Greatest distance of a bead from the surface of its layer, mm.
+    pub surface_residual: f64,
 }
 
 impl Totals {

@@ -25,17 +25,19 @@ use mesh::mesh::Mesh;
 use crate::check::acceleration::Acceleration;
 use crate::check::axis::Clearance;
 use crate::check::continuity::Continuity;
-use crate::check::deposit::Deposit;
+use crate::check::deposit::{Deposit, Solid};
 use crate::check::heat::Heat;
 use crate::check::modes::Modes;
 use crate::check::reach::Reach;
 use crate::check::speed::Speed;
+use crate::check::surface::Surface;
 use crate::check::text::Text;
-use crate::check::volume::Volume;
+use crate::check::volume::{Enclosed, Volume};
+use crate::family::Family;
 use crate::finding::{Finding, Findings, Omitted, Place, Severity};
 use crate::replay::{Event, Heating, LayerMark, Replay, read};
 use crate::rounding::Doubt;
-use crate::section::{Section, Sweep, volume};
+use crate::section::{Section, Sweep, surface, volume};
 use crate::segment::Segment;
 use crate::totals::{Tally, Totals};
 
@@ -89,6 +91,7 @@ pub struct Verifier<'a> {
     acceleration: Acceleration,
     continuity: Continuity,
     heat: Heat,
+    surface: Surface,
     volume: Volume,
     deposit: Deposit,
     part: Option<Part<'a>>,
@@ -98,8 +101,17 @@ pub struct Verifier<'a> {
 /// The mesh and what is cut from it at the present layer.
 #[derive(Debug)]
 struct Part<'a> {
+    mesh: &'a Mesh,
     sweep: Sweep<'a>,
     section: Section,
+    /// Made for the first curved layer.
+    solid: Option<Solid<'a>>,
+}
+
+impl<'a> Part<'a> {
+    fn new(mesh: &'a Mesh) -> Self {
+        Self { mesh, sweep: Sweep::new(mesh), section: Section::default(), solid: None }
+    }
 }
 
 impl<'a> Verifier<'a> {
@@ -119,9 +131,10 @@ impl<'a> Verifier<'a> {
             acceleration: Acceleration::new(printer),
             continuity: Continuity::default(),
             heat: Heat::new(printer),
+            surface: Surface::new(printer),
             volume: Volume::new(filament_area, printer.nozzle_diameter),
             deposit: Deposit::default(),
-            part: mesh.map(|mesh| Part { sweep: Sweep::new(mesh), section: Section::default() }),
+            part: mesh.map(Part::new),
             setup,
         }
     }
@@ -155,7 +168,8 @@ impl<'a> Verifier<'a> {
         self.acceleration.rest(&mut self.findings);
         self.continuity.end(place, &mut self.findings);
         self.heat.end(place, &mut self.findings);
-        let enclosed = self.setup.mesh.map(volume);
+        let enclosed =
+            self.setup.mesh.map(|mesh| Enclosed { volume: volume(mesh), surface: surface(mesh) });
         let unjudged = self.volume.end(enclosed, self.setup.solid, &mut self.findings);
         let mut notes: Vec<&'static str> = unjudged.into_iter().collect();
         if self.setup.dialect.space == Space::Part {
@@ -216,6 +230,7 @@ impl<'a> Verifier<'a> {
         self.acceleration.segment(segment, &doubt, findings);
         self.continuity.segment(segment, findings);
         self.heat.segment(segment, findings);
+        self.surface.segment(segment);
         self.volume.segment(segment);
         if self.part.is_some() {
             self.deposit.segment(segment);
@@ -231,7 +246,10 @@ impl<'a> Verifier<'a> {
     fn layer(&mut self, mark: LayerMark) {
         self.end_layer();
         self.continuity.layer(mark, &mut self.findings);
+        self.surface.layer(mark);
+        let is_planar = mark.family.unwrap_or_default() == Family::Planar;
         let middle = mark.top.zip(mark.height).map(|(top, height)| top - height / 2.0);
+        let middle = middle.filter(|_| is_planar);
         let section = match (&mut self.part, middle) {
             (Some(part), Some(middle)) => {
                 part.sweep.cut(middle, &mut part.section);
@@ -240,11 +258,16 @@ impl<'a> Verifier<'a> {
             _ => None,
         };
         self.volume.layer(mark, section);
-        self.deposit.layer(mark.index, mark.top.filter(|_| section.is_some()));
+        self.deposit.layer(&mark);
     }
 
     fn end_layer(&mut self) {
-        if let Some(part) = &self.part {
+        self.surface.end_of_layer(&mut self.findings);
+        let Some(part) = &mut self.part else { return };
+        if self.deposit.is_curved() {
+            let solid = part.solid.get_or_insert_with(|| Solid::new(part.mesh));
+            self.deposit.end_of_curved_layer(solid, &mut self.findings);
+        } else {
             self.deposit.end_of_layer(&part.section, &mut self.findings);
         }
     }
@@ -270,6 +293,7 @@ impl<'a> Verifier<'a> {
             rail_acceleration: self.acceleration.greatest_rail(),
             deviation: self.continuity.worst_deviation(),
             nearest_to_axis,
+            surface_residual: self.surface.worst(),
         }
     }
 }

@@ -25,6 +25,7 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
             "moves": verdict.totals.moves,
             "time_s": verdict.totals.time,
             "filament_mm": verdict.totals.filament,
+            "surface_residual_mm": verdict.totals.surface_residual,
             "notes": verdict.notes,
         }))?;
     } else {
@@ -42,12 +43,14 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
         let totals = &verdict.totals;
         let _ = writeln!(
             out,
-            "{} findings; {} moves, {} of motion, bed {:.0} °/s, carriage {:.0} mm/s at most",
+            "{} findings; {} moves, {} of motion, bed {:.0} °/s, carriage {:.0} mm/s at most, beads \
+             within {:.1} µm of their layers",
             verdict.findings.len(),
             totals.moves,
             duration(totals.time),
             totals.bed_speed.to_degrees(),
-            totals.rail_speed
+            totals.rail_speed,
+            totals.surface_residual * 1e3
         );
         say(&out)?;
     }

@@ -225,7 +225,10 @@ mod tests {
         let found = |marks: &[(usize, Option<f64>)]| {
             let (mut check, mut findings) = (Continuity::default(), Findings::default());
             for &(index, top) in marks {
-                check.layer(LayerMark { line: 1, index, top, height: None }, &mut findings);
+                check.layer(
+                    LayerMark { line: 1, index, top, height: None, family: None },
+                    &mut findings,
+                );
             }
             findings.kept().len()
         };

@@ -1,16 +1,24 @@
 //! Does the outermost bead stay within the part?
 //!
 //! Halfway along external perimeters both sides of the bead are looked at: a point
-//! [`STICK_OUT`] + [`SLACK`] inside either side must lie in the mesh's section at the middle of the
-//! layer. A bounded number of segments of each layer is looked at, spread evenly over the layer:
-//! when there are too many, every other one is dropped and only every second, fourth, eighth …
-//! is taken from then on. Layers in which the nozzle leaves its plane are not judged. mm, part
-//! frame.
+//! [`STICK_OUT`] + [`SLACK`] inside either side must lie within the mesh, half a layer under the
+//! nozzle. On planar layers that is the mesh's section at the middle of the layer; on curved ones
+//! the points lie along the normal of the layer, the mesh's [columns](Columns) are asked, and how
+//! far the bead sticks out is its distance from the mesh: curved layers meet faces at shallow
+//! angles, where a µm across is many along the layer. Less than a layer's thickness is a warning
+//! there. A bounded number of segments of each layer is looked at, spread evenly over the layer: when there
+//! are too many, every other one is dropped and only every second, fourth, eighth … is taken from
+//! then on. Planar layers in which the nozzle leaves its plane are not judged. mm, part frame.
 
 use machine::program::Role;
-use nalgebra::{Point2, Point3, Vector2};
+use mesh::mesh::Mesh;
+use nalgebra::{Point2, Point3, Vector3};
 
-use crate::finding::{Findings, Place, exceeds};
+use crate::columns::Columns;
+use crate::family::Family;
+use crate::finding::{Findings, Place, Severity, exceeds};
+use crate::nearest::Nearest;
+use crate::replay::LayerMark;
 use crate::rounding;
 use crate::section::Section;
 use crate::segment::Segment;
@@ -25,6 +33,23 @@ pub const STICK_OUT: f64 = 0.02;
 /// places (0.001), and half the step of `;WIDTH:` (0.005).
 pub const SLACK: f64 = 0.013;
 
+/// Beads farther out than this are said to lie where the part is not, mm.
+const FAR_OUT: f64 = 1.0;
+
+/// The mesh, as curved layers need it.
+#[derive(Debug)]
+pub(crate) struct Solid<'a> {
+    columns: Columns<'a>,
+    nearest: Nearest,
+}
+
+impl<'a> Solid<'a> {
+    /// Prepares a mesh.
+    pub(crate) fn new(mesh: &'a Mesh) -> Self {
+        Self { columns: Columns::new(mesh), nearest: Nearest::new(mesh) }
+    }
+}
+
 /// Segments looked at in a layer. Each costs 0.1 µs and 64 bytes; 4096 segments of a usual length
 /// are 2 m of wall, so that nearly every layer is looked at in full.
 const MOST_SAMPLES: usize = 4096;
@@ -34,8 +59,8 @@ const MOST_SAMPLES: usize = 4096;
 struct Sample {
     line: usize,
     middle: Point3<f64>,
-    /// From the middle to the left, of length 1.
-    side: Vector2<f64>,
+    /// From the middle to the left along the layer, of length 1.
+    side: Vector3<f64>,
     half_width: f64,
 }
 
@@ -48,29 +73,39 @@ pub(crate) struct Deposit {
     /// One of so many is looked at; a power of two.
     every: usize,
     layer: Option<usize>,
+    family: Family,
     top: f64,
-    is_plane: bool,
+    /// Half the thickness of the layer, mm.
+    half_height: f64,
+    /// Whether the layer can be judged.
+    is_sound: bool,
 }
 
 impl Deposit {
-    /// Begins a layer whose upper side lies at `top`; `None` when that is not known.
-    pub(crate) fn layer(&mut self, index: usize, top: Option<f64>) {
+    /// Begins a layer.
+    pub(crate) fn layer(&mut self, mark: &LayerMark) {
         self.samples.clear();
         (self.seen, self.every) = (0, 1);
-        (self.layer, self.top) = (Some(index), top.unwrap_or_default());
-        self.is_plane = top.is_some();
+        (self.layer, self.top) = (Some(mark.index), mark.top.unwrap_or_default());
+        self.family = mark.family.unwrap_or_default();
+        self.half_height = mark.height.unwrap_or_default() / 2.0;
+        self.is_sound = mark.top.is_some() && mark.height.is_some();
     }
 
     pub(crate) fn segment(&mut self, segment: &Segment) {
-        if segment.role != Role::ExternalPerimeter || !segment.extrudes() || !self.is_plane {
+        if segment.role != Role::ExternalPerimeter || !segment.extrudes() || !self.is_sound {
             return;
         }
         let [from, to] = &segment.part;
-        let off = (from.z - self.top).abs().max((to.z - self.top).abs());
-        self.is_plane = !exceeds(off, rounding::IN_PLANE);
-        let along = to.xy() - from.xy();
-        let length = along.norm();
-        if length < rounding::LENGTH {
+        if self.family == Family::Planar {
+            let off = (from.z - self.top).abs().max((to.z - self.top).abs());
+            self.is_sound = !exceeds(off, rounding::IN_PLANE);
+        }
+        let middle = nalgebra::center(from, to);
+        let along = to - from;
+        let aside = self.family.normal(&middle).cross(&along);
+        let length = aside.norm();
+        if exceeds(rounding::LENGTH, length) {
             return;
         }
         if self.seen.is_multiple_of(self.every) {
@@ -79,8 +114,8 @@ impl Deposit {
         if self.seen.is_multiple_of(self.every) {
             self.samples.push(Sample {
                 line: segment.line,
-                middle: nalgebra::center(from, to),
-                side: Vector2::new(-along.y, along.x) / length,
+                middle,
+                side: aside / length,
                 half_width: segment.width / 2.0,
             });
         }
@@ -99,31 +134,59 @@ impl Deposit {
         }
     }
 
-    /// Judges the layer that ends, by its section.
+    /// Returns whether the layer that ends needs the mesh's columns to be judged.
+    pub(crate) fn is_curved(&self) -> bool {
+        self.family != Family::Planar && !self.samples.is_empty()
+    }
+
+    /// Judges the planar layer that ends, by its section.
     pub(crate) fn end_of_layer(&mut self, section: &Section, findings: &mut Findings) {
-        if !self.is_plane || self.samples.is_empty() {
+        if !self.is_sound || self.samples.is_empty() || self.is_curved() {
             return;
         }
         let probes: Vec<Point2<f64>> = self
             .samples
             .iter()
-            .flat_map(|sample| {
-                let inner = (sample.half_width - STICK_OUT - SLACK).max(0.0);
-                [1.0, -1.0].map(|sign| sample.at(sign * inner))
-            })
+            .flat_map(|sample| [1.0, -1.0].map(|sign| sample.probe(sign).xy()))
             .collect();
         let windings = section.windings(&probes);
         for (sample, windings) in self.samples.iter().zip(windings.chunks(2)) {
             let Some(left) = windings.iter().position(|&winding| winding == 0) else { continue };
             let sign = if left == 0 { 1.0 } else { -1.0 };
-            self.report(sample, sign, section, findings);
+            let out = section.distance(&sample.at(sign * sample.half_width).xy());
+            self.report(sample, out, Severity::Error, findings);
         }
     }
 
-    fn report(&self, sample: &Sample, sign: f64, section: &Section, findings: &mut Findings) {
-        let out = section.distance(&sample.at(sign * sample.half_width));
+    /// Judges the curved layer that ends, by the mesh's columns and its surface.
+    pub(crate) fn end_of_curved_layer(&mut self, solid: &Solid<'_>, findings: &mut Findings) {
+        if !self.is_sound {
+            return;
+        }
+        for sample in &self.samples {
+            let depth = self.family.normal(&sample.middle) * self.half_height;
+            let is_outside = |aside: f64| solid.columns.winding(&(sample.at(aside) - depth)) == 0;
+            let Some(sign) = [1.0, -1.0].into_iter().find(|sign| is_outside(sample.inner() * sign))
+            else {
+                continue;
+            };
+            let edge = sample.at(sign * sample.half_width) - depth;
+            let out = solid.nearest.distance(&edge, FAR_OUT);
+            if !exceeds(out, STICK_OUT + SLACK) {
+                continue;
+            }
+            let severity = if exceeds(out, 2.0 * self.half_height) {
+                Severity::Error
+            } else {
+                Severity::Warning
+            };
+            self.report(sample, out, severity, findings);
+        }
+    }
+
+    fn report(&self, sample: &Sample, out: f64, severity: Severity, findings: &mut Findings) {
         let place = Place { line: sample.line, layer: self.layer, at: Some(sample.middle) };
-        findings.error(NAME, place, (out, STICK_OUT), || {
+        findings.add(NAME, severity, place, (out, STICK_OUT), || {
             if out.is_finite() {
                 let width = 2.0 * sample.half_width;
                 format!(
@@ -138,8 +201,17 @@ impl Deposit {
 }
 
 impl Sample {
-    fn at(&self, aside: f64) -> Point2<f64> {
-        self.middle.xy() + self.side * aside
+    /// How far from the middle line the mesh is asked, mm.
+    fn inner(&self) -> f64 {
+        (self.half_width - STICK_OUT - SLACK).max(0.0)
+    }
+
+    fn probe(&self, sign: f64) -> Point3<f64> {
+        self.at(sign * self.inner())
+    }
+
+    fn at(&self, aside: f64) -> Point3<f64> {
+        self.middle + self.side * aside
     }
 }
 
@@ -150,12 +222,16 @@ mod tests {
     use crate::section::Sweep;
     use crate::section::tests::block;
 
+    fn mark(index: usize, top: f64, family: Option<Family>) -> LayerMark {
+        LayerMark { line: 1, index, top: Some(top), height: Some(0.2), family }
+    }
+
     /// A wall along x at this y in a block of 20 mm with a hole of 8 mm, in pieces.
     fn found(y: f64, pieces: u32) -> Vec<(f64, String)> {
         let mut section = Section::default();
         Sweep::new(&block(10.0, 4.0, 1.0, 0.0)).cut(0.5, &mut section);
         let (mut check, mut findings) = (Deposit::default(), Findings::default());
-        check.layer(3, Some(0.6));
+        check.layer(&mark(3, 0.6, None));
         for k in 0..pieces {
             let x = |k: u32| -3.0 + 6.0 * f64::from(k) / f64::from(pieces);
             let mut segment =
@@ -195,13 +271,38 @@ mod tests {
         let (mut check, mut findings) = (Deposit::default(), Findings::default());
         let mut segment = part_segment(Point3::new(0.0, 5.0, 0.6), Point3::new(2.0, 5.0, 0.6));
         (segment.role, segment.filament) = (Role::ExternalPerimeter, 0.1);
-        check.layer(0, Some(0.6));
+        check.layer(&mark(0, 0.6, None));
         check.segment(&segment);
         check.end_of_layer(&Section::default(), &mut findings);
         assert!(findings.kept()[0].message.contains("no section"));
-        check.layer(0, Some(0.8));
+        check.layer(&mark(0, 0.8, None));
         check.segment(&segment);
         check.end_of_layer(&Section::default(), &mut findings);
         assert_eq!(findings.kept().len(), 1);
+    }
+
+    #[test]
+    fn beads_of_a_cone_are_looked_at_along_the_layer() {
+        // In a block of 20 mm, on a cone that falls 30° outwards: the bead's outer side may lie at
+        // y = 10 half a layer under the nozzle, along the normal.
+        let family = Family::Conical { slope: 30_f64.to_radians().tan() };
+        let block = block(10.0, 0.0, 20.0, 0.0);
+        let solid = Solid::new(&block);
+        let (sin, cos) = 30_f64.to_radians().sin_cos();
+        let fits = 10.0 - 0.225 * cos + 0.1 * sin;
+        let found = |y: f64| {
+            let (mut check, mut findings) = (Deposit::default(), Findings::default());
+            check.layer(&mark(0, 15.0, Some(family)));
+            let at = |x: f64| Point3::new(x, y, family.height(15.0, y.hypot(x)));
+            let mut segment = part_segment(at(-0.05), at(0.05));
+            (segment.role, segment.filament) = (Role::ExternalPerimeter, 0.1);
+            check.segment(&segment);
+            check.end_of_curved_layer(&solid, &mut findings);
+            findings.kept().first().map(|found| found.measured)
+        };
+        assert_eq!((found(fits), found(fits + 0.025), found(5.0)), (None, None, None));
+        let out = found(fits + 0.1).unwrap();
+        assert!((out - 0.1).abs() < 1e-3, "{out}");
+        assert_eq!(found(11.5), Some(f64::INFINITY));
     }
 }

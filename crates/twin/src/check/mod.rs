@@ -6,7 +6,8 @@
 //! that is not a number is always a finding.
 //!
 //! On the text: [`text`], [`modes`]. On the machine: [`reach`], [`axis`], [`speed`],
-//! [`acceleration`], [`heat`]. On the part: [`continuity`], [`volume`], [`deposit`].
+//! [`acceleration`], [`heat`]. On the part: [`continuity`], [`surface`],
+//! [`volume`], [`deposit`].
 
 pub mod acceleration;
 pub mod axis;
@@ -16,5 +17,6 @@ pub mod heat;
 pub mod modes;
 pub mod reach;
 pub mod speed;
+pub mod surface;
 pub mod text;
 pub mod volume;

@@ -11,8 +11,9 @@
 //!   the edges of its outermost beads: a bead's side is a half circle, which leaves
 //!   `h²·(1 − π/4)/2` of the outline's square corner empty.
 //!
-//! Where the nozzle leaves the plane of its layer, layers cannot be told by a plane section; then
-//! only the print as a whole is compared, with the volume that the mesh encloses. Shells that
+//! Curved layers, and those in which the nozzle leaves its plane, cannot be told by a plane section;
+//! then only the print as a whole is compared, with the volume that the mesh encloses, and its
+//! surface stands for the outlines. Shells that
 //! overlap are counted as often as they do (see [`crate::section`]).
 //!
 //! mm, mm², mm³. Part frame.
@@ -135,11 +136,11 @@ impl Volume {
         Role::ALL.map(|role| (role, self.by_role[role_index(role)] * self.filament_area))
     }
 
-    /// Compares with the mesh, whose enclosed volume is `enclosed`; `is_solid` when the print is
+    /// Compares with the mesh, which holds what `enclosed` says; `is_solid` when the print is
     /// meant to be. Returns what could not be judged.
     pub(crate) fn end(
         &self,
-        enclosed: Option<f64>,
+        enclosed: Option<Enclosed>,
         is_solid: bool,
         findings: &mut Findings,
     ) -> Option<&'static str> {
@@ -160,7 +161,7 @@ impl Volume {
         } else {
             let note = "volume: layers are curved or lack ;Z: or ;HEIGHT:, only the whole print \
                         is compared";
-            (Bill { section: enclosed, ..self.borders() }, Some(note))
+            (self.whole_mesh(&enclosed), Some(note))
         };
         whole(laid, &bill, is_solid, place, findings);
         note
@@ -181,14 +182,22 @@ impl Volume {
         }
     }
 
-    /// The allowances for borders, where sections do not count.
-    fn borders(&self) -> Bill {
-        let bills = self.layers.iter().map(|layer| {
-            let height = layer.height.unwrap_or(0.0);
-            Bill { section: 0.0, ..Bill::for_outline(layer.outline, height) }
-        });
-        bills.fold(Bill::default(), |sum, bill| sum.plus(&bill))
+    /// What the mesh holds, where sections do not count.
+    fn whole_mesh(&self, enclosed: &Enclosed) -> Bill {
+        let height = self.layers.iter().filter_map(|layer| layer.height).fold(0.0, f64::max);
+        // An outline times the thickness of its layer is a piece of the surface.
+        let edges = enclosed.surface * height * (1.0 - FRAC_PI_4) / 2.0;
+        Bill { section: enclosed.volume, border: enclosed.surface * BORDER, edges }
     }
+}
+
+/// What a mesh encloses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Enclosed {
+    /// mm³.
+    pub(crate) volume: f64,
+    /// Area of its surface, mm².
+    pub(crate) surface: f64,
 }
 
 /// What a layer, or a print, should hold.
@@ -272,14 +281,15 @@ mod tests {
         for (index, share) in shares.into_iter().enumerate() {
             let top = HEIGHT * (index + 1) as f64;
             let (top_mark, height) = (Some(top), Some(HEIGHT));
-            let mark = LayerMark { line: index + 1, index, top: top_mark, height };
+            let mark = LayerMark { line: index + 1, index, top: top_mark, height, family: None };
             check.layer(mark, Some(&section_at(top - HEIGHT / 2.0)));
             let mut line = segment(joints(5.0, 0.0, top), joints(9.0, 1.0, top), 20.0);
             (line.filament, line.role) = (share * 400.0 * HEIGHT / 2.0, role);
             check.segment(&line);
         }
         let mut findings = Findings::default();
-        assert_eq!(check.end(Some(400.0), is_solid, &mut findings), None);
+        let enclosed = Enclosed { volume: 400.0, surface: 880.0 };
+        assert_eq!(check.end(Some(enclosed), is_solid, &mut findings), None);
         findings.kept().iter().map(|finding| finding.line).collect()
     }
 
@@ -301,7 +311,7 @@ mod tests {
         line.filament = 0.5;
         line.role = Role::Custom;
         check.segment(&line);
-        let mark = LayerMark { line: 1, index: 0, top: Some(0.2), height: None };
+        let mark = LayerMark { line: 1, index: 0, top: Some(0.2), height: None, family: None };
         check.layer(mark, None);
         line.role = Role::Perimeter;
         check.segment(&line);
@@ -319,13 +329,16 @@ mod tests {
         let mut findings = Findings::default();
         let mut check = Volume::new(2.0, 0.4);
         assert!(check.end(None, true, &mut findings).unwrap().contains("without a mesh"));
-        assert!(check.end(Some(1.0), true, &mut findings).unwrap().contains("no layers"));
-        let mark = LayerMark { line: 4, index: 0, top: Some(1.0), height: Some(1.0) };
+        let small = Enclosed { volume: 1.0, surface: 6.0 };
+        assert!(check.end(Some(small), true, &mut findings).unwrap().contains("no layers"));
+        let mark = LayerMark { line: 4, index: 0, top: Some(1.0), height: Some(1.0), family: None };
         check.layer(mark, Some(&section_at(0.5)));
         let mut rising = segment(joints(5.0, 0.0, 0.5), joints(9.0, 1.0, 1.0), 20.0);
         rising.filament = 200.0;
         check.segment(&rising);
-        let mesh = section::volume(&block(10.0, 0.0, 1.0, 0.0));
+        let block = block(10.0, 0.0, 1.0, 0.0);
+        let mesh = Enclosed { volume: section::volume(&block), surface: section::surface(&block) };
+        assert_eq!(mesh.surface, 880.0);
         assert!(check.end(Some(mesh), true, &mut findings).unwrap().contains("curved"));
         assert!(findings.checks().is_empty());
         check.segment(&rising);
