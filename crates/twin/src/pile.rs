@@ -1,0 +1,344 @@
+//! What has been laid so far, as heights over a grid seen from above.
+//!
+//! A nozzle from above only ever meets the highest material, and a bead rests on the highest that
+//! lies under it; so one height for every cell is all that is needed, and the one before the
+//! present layer, so that neighbours in a layer do not carry each other. Cells are [`CELL`] wide and
+//! come in tiles, of which only those exist that something was laid on. Part frame, mm.
+
+use nalgebra::{Point2, Point3};
+
+use crate::family::Family;
+
+/// Width of a cell, mm: a quarter of a narrow bead.
+pub const CELL: f64 = 0.1;
+
+/// Cells along the side of a tile.
+const TILE: usize = 64;
+
+/// Cells along the side of a block, for which a tile knows the greatest height.
+const BLOCK: usize = 8;
+
+/// The number that no layer and no stroke has.
+const NONE: u32 = u32::MAX;
+
+/// One cell.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    /// The height of what was laid, mm.
+    top: f32,
+    /// The same before its layer began.
+    under: f32,
+    /// The layer that laid it last.
+    layer: u32,
+    /// The stroke that laid it last.
+    stroke: u32,
+}
+
+const BARE: Cell = Cell { top: 0.0, under: 0.0, layer: NONE, stroke: NONE };
+
+#[derive(Debug, Clone)]
+struct Tile {
+    cells: Vec<Cell>,
+    /// The greatest height in each block.
+    blocks: [f32; (TILE / BLOCK) * (TILE / BLOCK)],
+    greatest: f32,
+}
+
+impl Tile {
+    fn bare() -> Self {
+        Self {
+            cells: vec![BARE; TILE * TILE],
+            blocks: [0.0; (TILE / BLOCK) * (TILE / BLOCK)],
+            greatest: 0.0,
+        }
+    }
+}
+
+/// A short straight piece of a bead.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Piece {
+    /// Where the tip of the nozzle starts and ends.
+    pub(crate) ends: [Point3<f64>; 2],
+    pub(crate) half_width: f64,
+    /// Along the normal of the layer.
+    pub(crate) thickness: f64,
+    pub(crate) family: Family,
+    pub(crate) layer: u32,
+    /// The number of the stroke that it belongs to.
+    pub(crate) stroke: u32,
+}
+
+/// What a piece came to lie on, in cells.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Footing {
+    /// That it covers.
+    pub(crate) covered: u32,
+    /// Where it rests on the bed or on earlier layers.
+    pub(crate) resting: u32,
+    /// Where another stroke of the same layer lies already.
+    pub(crate) taken: u32,
+    /// The empty space under it, mm³.
+    pub(crate) hollow: f64,
+}
+
+impl Footing {
+    /// Returns the share that rests on something.
+    pub(crate) fn share(&self) -> f64 {
+        if self.covered == 0 { 1.0 } else { f64::from(self.resting) / f64::from(self.covered) }
+    }
+
+    /// Returns the share that another stroke has taken.
+    pub(crate) fn taken_share(&self) -> f64 {
+        if self.covered == 0 { 0.0 } else { f64::from(self.taken) / f64::from(self.covered) }
+    }
+}
+
+/// A place in the pile that rises above a limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Peak {
+    /// Its height above what is allowed there, mm.
+    pub(crate) above: f64,
+    pub(crate) at: Point3<f64>,
+}
+
+/// How far from what it lies on a bead may end and still rest there, as a share of its thickness.
+/// Half: below, the bead is squeezed out by half; above, it still touches what sags.
+const TOUCHING: f64 = 0.5;
+
+/// Heights of what was laid. See the [module](self).
+#[derive(Debug)]
+pub(crate) struct Pile {
+    /// Tiles along one side.
+    side: usize,
+    /// The least corner, the same for x and y.
+    corner: f64,
+    tiles: Vec<Option<Box<Tile>>>,
+    greatest: f64,
+}
+
+impl Pile {
+    /// Returns a bare bed that reaches `reach` mm from the axis.
+    pub(crate) fn new(reach: f64) -> Self {
+        let tile = CELL * TILE as f64;
+        let half = (reach / tile).ceil().max(1.0);
+        let side = 2 * half as usize;
+        Self { side, corner: -half * tile, tiles: vec![None; side * side], greatest: 0.0 }
+    }
+
+    /// Returns the greatest height, mm.
+    pub(crate) fn greatest(&self) -> f64 {
+        self.greatest
+    }
+
+    /// Lays a piece, and returns what it came to lie on.
+    pub(crate) fn lay(&mut self, piece: &Piece) -> Footing {
+        let [from, to] = piece.ends;
+        let middle = nalgebra::center(&from, &to);
+        let rise = piece.thickness / piece.family.normal(&middle).z;
+        let along = to.xy() - from.xy();
+        let square = along.norm_squared();
+        let reach = piece.half_width * piece.half_width;
+        let least = from.xy().inf(&to.xy()).map(|c| c - piece.half_width);
+        let most = from.xy().sup(&to.xy()).map(|c| c + piece.half_width);
+        let mut footing = Footing::default();
+        for row in self.index(least.y)..=self.index(most.y) {
+            for column in self.index(least.x)..=self.index(most.x) {
+                let at = Point2::new(self.middle(column), self.middle(row));
+                let from_start = at - from.xy();
+                let share = if square > 0.0 { from_start.dot(&along) / square } else { 0.0 };
+                let share = share.clamp(0.0, 1.0);
+                if (from_start - along * share).norm_squared() > reach {
+                    continue;
+                }
+                let foot = from + (to - from) * share;
+                let top = match piece.family {
+                    Family::Planar => foot.z,
+                    family => family.height(family.level(&foot), at.coords.norm()),
+                };
+                if top.is_finite() {
+                    self.lay_cell([column, row], [top - rise, top], piece, &mut footing);
+                }
+            }
+        }
+        footing
+    }
+
+    fn lay_cell(
+        &mut self,
+        [column, row]: [usize; 2],
+        [bottom, top]: [f64; 2],
+        piece: &Piece,
+        footing: &mut Footing,
+    ) {
+        let tile = &mut self.tiles[row / TILE * self.side + column / TILE];
+        let tile = tile.get_or_insert_with(|| Box::new(Tile::bare()));
+        let (x, y) = (column % TILE, row % TILE);
+        let cell = &mut tile.cells[y * TILE + x];
+        footing.covered += 1;
+        if cell.layer == piece.layer {
+            footing.taken += u32::from(cell.stroke != piece.stroke);
+        } else {
+            (cell.under, cell.layer) = (cell.top, piece.layer);
+        }
+        cell.stroke = piece.stroke;
+        let gap = bottom - f64::from(cell.under);
+        if gap <= TOUCHING * (top - bottom) {
+            footing.resting += 1;
+        } else {
+            footing.hollow += gap * CELL * CELL;
+        }
+        let height = top as f32;
+        cell.top = cell.top.max(height);
+        let block = &mut tile.blocks[y / BLOCK * (TILE / BLOCK) + x / BLOCK];
+        *block = block.max(height);
+        tile.greatest = tile.greatest.max(height);
+        self.greatest = self.greatest.max(top);
+    }
+
+    /// Returns the place that rises highest above `limit`, which is the allowed height at a
+    /// distance from `axis` and grows with it; `None` when nothing rises above it within `radius`.
+    /// With `layer`, what that layer laid is left out.
+    pub(crate) fn peak(
+        &self,
+        axis: &Point2<f64>,
+        radius: f64,
+        layer: Option<u32>,
+        limit: impl Fn(f64) -> f64,
+    ) -> Option<Peak> {
+        let mut worst: Option<Peak> = None;
+        let tiles = |c: f64| self.index(c) / TILE;
+        for row in tiles(axis.y - radius)..=tiles(axis.y + radius) {
+            for column in tiles(axis.x - radius)..=tiles(axis.x + radius) {
+                let Some(tile) = &self.tiles[row * self.side + column] else { continue };
+                let origin = [column * TILE, row * TILE];
+                let nearest = self.nearest(axis, origin, TILE);
+                if nearest <= radius && f64::from(tile.greatest) > limit(nearest) {
+                    self.peak_in_tile(tile, origin, (axis, radius), layer, &limit, &mut worst);
+                }
+            }
+        }
+        worst
+    }
+
+    fn peak_in_tile(
+        &self,
+        tile: &Tile,
+        origin: [usize; 2],
+        (axis, radius): (&Point2<f64>, f64),
+        layer: Option<u32>,
+        limit: &impl Fn(f64) -> f64,
+        worst: &mut Option<Peak>,
+    ) {
+        for (block, &greatest) in tile.blocks.iter().enumerate() {
+            let inside = [block % (TILE / BLOCK) * BLOCK, block / (TILE / BLOCK) * BLOCK];
+            let from = [origin[0] + inside[0], origin[1] + inside[1]];
+            let nearest = self.nearest(axis, from, BLOCK);
+            if nearest > radius || f64::from(greatest) <= limit(nearest) {
+                continue;
+            }
+            for k in 0..BLOCK * BLOCK {
+                let (x, y) = (k % BLOCK, k / BLOCK);
+                let cell = &tile.cells[(inside[1] + y) * TILE + inside[0] + x];
+                let height = if layer == Some(cell.layer) { cell.under } else { cell.top };
+                let at = Point2::new(self.middle(from[0] + x), self.middle(from[1] + y));
+                let distance = (at - axis).norm();
+                let above = f64::from(height) - limit(distance);
+                if distance <= radius && above > worst.map_or(0.0, |peak| peak.above) {
+                    let at = Point3::new(at.x, at.y, f64::from(height));
+                    *worst = Some(Peak { above, at });
+                }
+            }
+        }
+    }
+
+    /// The distance of `p` from a square of cells.
+    fn nearest(&self, p: &Point2<f64>, from: [usize; 2], cells: usize) -> f64 {
+        let beyond = |k: usize| {
+            let least = self.corner + from[k] as f64 * CELL;
+            let most = least + cells as f64 * CELL;
+            (least - p[k]).max(p[k] - most).max(0.0)
+        };
+        beyond(0).hypot(beyond(1))
+    }
+
+    /// The row or column of a coordinate; the outermost for what lies beyond.
+    fn index(&self, c: f64) -> usize {
+        (((c - self.corner) / CELL).max(0.0) as usize).min(self.side * TILE - 1)
+    }
+
+    fn middle(&self, index: usize) -> f64 {
+        self.corner + (index as f64 + 0.5) * CELL
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn piece(y: f64, z: f64, layer: u32, stroke: u32) -> Piece {
+        Piece {
+            ends: [Point3::new(-5.0, y, z), Point3::new(5.0, y, z)],
+            half_width: 0.225,
+            thickness: 0.2,
+            family: Family::Planar,
+            layer,
+            stroke,
+        }
+    }
+
+    #[test]
+    fn beads_rest_on_the_bed_and_on_each_other() {
+        let mut pile = Pile::new(50.0);
+        let first = pile.lay(&piece(0.0, 0.2, 0, 0));
+        assert_eq!((first.share(), first.taken, first.hollow), (1.0, 0, 0.0));
+        let covered = f64::from(first.covered) * CELL * CELL;
+        let area = 10.0 * 0.45 + std::f64::consts::PI * 0.225 * 0.225;
+        assert!((covered / area - 1.0).abs() < 0.15, "{covered} {area}");
+        // One and a half layers above the bed.
+        let second = pile.lay(&piece(0.0, 0.4, 1, 1));
+        assert_eq!((second.share(), second.taken_share()), (1.0, 0.0));
+        let beside = pile.lay(&piece(0.2, 0.6, 2, 2));
+        assert!((beside.share() - 0.55).abs() < 0.12, "{}", beside.share());
+        let far = pile.lay(&piece(3.0, 0.6, 2, 3));
+        assert_eq!(far.share(), 0.0);
+        assert!((far.hollow - f64::from(far.covered) * CELL * CELL * 0.4).abs() < 1e-6);
+    }
+
+    #[test]
+    fn neighbours_of_a_layer_do_not_carry_each_other() {
+        let mut pile = Pile::new(50.0);
+        assert_eq!(pile.lay(&piece(0.0, 5.0, 7, 0)).share(), 0.0);
+        let again = pile.lay(&piece(0.0, 5.0, 7, 1));
+        assert_eq!((again.share(), again.taken_share()), (0.0, 1.0));
+    }
+
+    #[test]
+    fn peaks_are_those_of_a_full_search() {
+        let mut pile = Pile::new(50.0);
+        pile.lay(&piece(0.0, 0.2, 0, 0));
+        pile.lay(&piece(8.0, 3.0, 1, 1));
+        let axis = Point2::new(0.0, 1.0);
+        let limit = |distance: f64| 1.0 + 0.1 * distance;
+        let peak = pile.peak(&axis, 10.0, None, limit).unwrap();
+        // The nearest side of the bead at y = 8.
+        assert!((peak.above - (3.0 - 1.0 - 0.1 * 6.8)).abs() < 0.02, "{peak:?}");
+        assert_eq!(pile.peak(&axis, 10.0, Some(1), limit), None);
+        assert_eq!(pile.peak(&axis, 6.0, None, limit), None);
+        assert_eq!(pile.peak(&axis, 10.0, None, |d| 3.0 + d), None);
+    }
+
+    #[test]
+    fn a_cone_lies_on_the_cone_below() {
+        let family = Family::Conical { slope: 1.0 };
+        let mut pile = Pile::new(50.0);
+        let step = 0.2 * 2.0_f64.sqrt();
+        for layer in 0..3 {
+            let level = 20.0 + step * f64::from(layer);
+            let at = |x: f64| Point3::new(x, 0.0, family.height(level, x));
+            let ends = [at(5.0), at(7.0)];
+            let footing = pile.lay(&Piece { ends, family, ..piece(0.0, 0.0, layer, layer) });
+            let expected = if layer == 0 { 0.0 } else { 1.0 };
+            assert_eq!(footing.share(), expected, "{layer}");
+        }
+    }
+}
