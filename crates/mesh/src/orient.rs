@@ -104,7 +104,8 @@ const MOST_CLASSES: usize = 8;
 pub fn candidates(mesh: &Mesh, params: &OrientParams) -> Vec<Candidate> {
     let faces = Faces::of(mesh);
     let classes = classes::classes(&faces, params.class_tolerance_rad);
-    ranked(mesh, &faces, &classes[..classes.len().min(MOST_CLASSES)], params)
+    let ranked = ranked(mesh, &faces, &classes[..classes.len().min(MOST_CLASSES)], params);
+    ranked.into_iter().map(|lying| lying.candidate).collect()
 }
 
 /// Returns the rotation `part_from_model` that lays the part down as a candidate says.
@@ -124,11 +125,9 @@ pub fn rest(mesh: &Mesh, params: &OrientParams) -> (Rotation3<f64>, Rest) {
     {
         let least = first.area_mm2 - SAME_SHARE * faces.total_mm2;
         let (tied, smaller) = classes.split_at(classes.partition_point(|c| c.area_mm2 >= least));
-        let stands = |c: &Candidate| {
-            let side = Side::below(mesh, &faces, &c.down, params, STAND_DEPTH_SHARE);
-            side.area_mm2 >= LEAST_STAND_SHARE * faces.total_mm2
-        };
+        let stands = |c: &Lying| c.stand_mm2 >= LEAST_STAND_SHARE * faces.total_mm2;
         if let Some(best) = ranked(mesh, &faces, tied, params).into_iter().find(stands) {
+            let best = best.candidate;
             return (part_from_model(mesh, &best.down), Rest::Flat(best));
         }
         classes = smaller;
@@ -171,28 +170,29 @@ fn ranked(
     faces: &Faces,
     classes: &[classes::Class],
     params: &OrientParams,
-) -> Vec<Candidate> {
+) -> Vec<Lying> {
     let both_ways = classes.par_iter().flat_map(|class| {
         [class.direction, -class.direction].map(|down| candidate(mesh, faces, class, down, params))
     });
-    let mut left: Vec<Candidate> = both_ways.collect();
+    let mut lying: Vec<Lying> = both_ways.collect();
     let area = SAME_SHARE * faces.total_mm2;
     let length = SAME_SHARE * faces.diagonal;
     // Computed when two candidates differ in nothing else.
     let mut reference = None;
-    let mut ranked = Vec::with_capacity(left.len());
-    while !left.is_empty() {
-        let mut best: Vec<usize> = (0..left.len()).collect();
-        keep_least(&mut best, area, |i| -left[i].class_area_mm2);
-        keep_least(&mut best, area, |i| -left[i].bed_area_mm2);
-        keep_least(&mut best, length, |i| left[i].height_mm);
-        keep_least(&mut best, area, |i| left[i].overhang_area_mm2);
-        keep_least(&mut best, SAME_ANGLE_RAD, |i| left[i].down.z);
+    let mut ranked = Vec::with_capacity(lying.len());
+    while !lying.is_empty() {
+        let at = |i: usize| &lying[i].candidate;
+        let mut best: Vec<usize> = (0..lying.len()).collect();
+        keep_least(&mut best, area, |i| -at(i).class_area_mm2);
+        keep_least(&mut best, area, |i| -at(i).bed_area_mm2);
+        keep_least(&mut best, length, |i| at(i).height_mm);
+        keep_least(&mut best, area, |i| at(i).overhang_area_mm2);
+        keep_least(&mut best, SAME_ANGLE_RAD, |i| at(i).down.z);
         if best.len() > 1 {
             let reference = *reference.get_or_insert_with(|| reference_azimuth(mesh));
-            keep_least(&mut best, 0.0, |i| azimuth_from(reference, &left[i].down));
+            keep_least(&mut best, 0.0, |i| azimuth_from(reference, &at(i).down));
         }
-        ranked.push(left.remove(best[0]));
+        ranked.push(lying.remove(best[0]));
     }
     ranked
 }
@@ -210,71 +210,79 @@ fn azimuth_from(reference: f64, down: &Vector3<f64>) -> f64 {
     if turn > TAU - SAME_ANGLE_RAD { 0.0 } else { turn }
 }
 
+/// A candidate, and whether it would stand.
+struct Lying {
+    candidate: Candidate,
+    /// Area that faces down within [`STAND_DEPTH_SHARE`] of the bed, mm².
+    stand_mm2: f64,
+}
+
 fn candidate(
     mesh: &Mesh,
     faces: &Faces,
     class: &classes::Class,
     down: Vector3<f64>,
     params: &OrientParams,
-) -> Candidate {
-    let side = Side::below(mesh, faces, &down, params, BED_SHARE);
-    Candidate {
+) -> Lying {
+    let side = Side::below(mesh, faces, &down, params);
+    let candidate = Candidate {
         // Adding zero makes -0 into 0, which reads better in a report.
         down: down.map(|c| c + 0.0),
         class_area_mm2: class.area_mm2,
-        bed_area_mm2: side.area_mm2,
+        bed_area_mm2: side.bed_mm2,
         height_mm: side.height_mm,
-        overhang_area_mm2: side.overhang_area_mm2,
-    }
+        overhang_area_mm2: side.overhang_mm2,
+    };
+    Lying { candidate, stand_mm2: side.stand_mm2 }
 }
 
-/// What is at the bottom of a part when some direction goes down.
+/// What is at the bottom of a part when some direction goes down. Areas mm².
 struct Side {
-    /// Area that faces down and is near the bed.
-    area_mm2: f64,
-    /// Area elsewhere that faces down too steeply.
-    overhang_area_mm2: f64,
+    /// Area that faces down and lies on the bed.
+    bed_mm2: f64,
+    /// Area that faces down within [`STAND_DEPTH_SHARE`] of the bed.
+    stand_mm2: f64,
+    /// Area not on the bed that faces down too steeply.
+    overhang_mm2: f64,
     height_mm: f64,
 }
 
 impl Side {
-    /// Looks at the facets within `depth_share` of the diagonal from the bed.
-    fn below(
-        mesh: &Mesh,
-        faces: &Faces,
-        down: &Vector3<f64>,
-        params: &OrientParams,
-        depth_share: f64,
-    ) -> Self {
+    fn below(mesh: &Mesh, faces: &Faces, down: &Vector3<f64>, params: &OrientParams) -> Self {
         let depth = |p: &Point3<f64>| p.coords.dot(down);
         let none = || (f64::INFINITY, f64::NEG_INFINITY);
         let reach = mesh.vertices.par_iter().map(|p| (depth(p), depth(p)));
         let (top, bed) = reach.reduce(none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let near_bed = bed - depth_share * faces.diagonal;
+        let on_bed = bed - BED_SHARE * faces.diagonal;
+        let near_bed = bed - STAND_DEPTH_SHARE * faces.diagonal;
         let of_class = params.class_tolerance_rad.cos();
         let steep = params.overhang_rad.sin() + SAME_SHARE;
+        let height_mm = if mesh.vertices.is_empty() { 0.0 } else { bed - top };
+        let none = Self { bed_mm2: 0.0, stand_mm2: 0.0, overhang_mm2: 0.0, height_mm };
         let piece = |(k, normals): (usize, &[Vector3<f64>])| {
-            let (mut on_bed, mut overhang) = (0.0, 0.0);
+            let mut side = Self { ..none };
             for (t, normal) in (k * PIECE..).zip(normals) {
-                let facing = normal.dot(down);
-                let stands = || mesh.corners(t as u32).iter().all(|p| depth(p) >= near_bed);
-                if facing >= of_class && stands() {
-                    on_bed += faces.areas_mm2[t];
+                let (facing, area) = (normal.dot(down), faces.areas_mm2[t]);
+                let lowest = || mesh.corners(t as u32).iter().map(depth).fold(f64::MAX, f64::min);
+                let lowest = if facing >= of_class { lowest() } else { f64::NEG_INFINITY };
+                if lowest >= near_bed {
+                    side.stand_mm2 += area;
+                }
+                if lowest >= on_bed {
+                    side.bed_mm2 += area;
                 } else if facing > steep {
-                    overhang += faces.areas_mm2[t];
+                    side.overhang_mm2 += area;
                 }
             }
-            (on_bed, overhang)
+            side
         };
-        let pieces: Vec<(f64, f64)> =
-            faces.normals.par_chunks(PIECE).enumerate().map(piece).collect();
-        let height_mm = if mesh.vertices.is_empty() { 0.0 } else { bed - top };
-        let mut side = Self { area_mm2: 0.0, overhang_area_mm2: 0.0, height_mm };
-        for (on_bed, overhang) in pieces {
-            side.area_mm2 += on_bed;
-            side.overhang_area_mm2 += overhang;
-        }
-        side
+        let pieces: Vec<Self> = faces.normals.par_chunks(PIECE).enumerate().map(piece).collect();
+        pieces.iter().fold(none, |sum, piece| Self {
+            bed_mm2: sum.bed_mm2 + piece.bed_mm2,
+            stand_mm2: sum.stand_mm2 + piece.stand_mm2,
+            overhang_mm2: sum.overhang_mm2 + piece.overhang_mm2,
+            height_mm,
+        })
     }
 }
 

@@ -119,7 +119,7 @@ mod tests {
 
     fn print(x: f64, filament: f64) -> Stroke {
         let to = Point3::new(x, 5.0, 0.2);
-        Stroke { kind: Kind::Print, to, filament, speed: 40.0 }
+        Stroke { kind: Kind::Print, to, filament, speed: 40.0, continues: false }
     }
 
     #[test]

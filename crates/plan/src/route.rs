@@ -91,6 +91,9 @@ pub struct Stroke {
     pub filament: f64,
     /// The speed that is wanted, mm/s: of the nozzle, or of the filament where it stands still.
     pub speed: f64,
+    /// Whether it goes on with the line of the stroke before, in the same bead: the two may become
+    /// one move.
+    pub continues: bool,
 }
 
 /// A stroke, or a step that goes to the program as it is.
@@ -188,7 +191,18 @@ impl Router {
     }
 
     fn stroke(&mut self, kind: Kind, to: Point3<f64>, filament: f64, speed: f64) {
-        self.items.push(Item::Stroke(Stroke { kind, to, filament, speed }));
+        let continues = false;
+        self.items.push(Item::Stroke(Stroke { kind, to, filament, speed, continues }));
+        self.at = to;
+    }
+
+    /// Lays a piece of a line; it continues one that was laid just before.
+    fn lay(&mut self, to: Point3<f64>, filament: f64, speed: f64) {
+        let continues = matches!(
+            self.items.last(),
+            Some(Item::Stroke(Stroke { kind: Kind::Print, speed: before, .. })) if *before == speed
+        );
+        self.items.push(Item::Stroke(Stroke { kind: Kind::Print, to, filament, speed, continues }));
         self.at = to;
     }
 
@@ -302,7 +316,7 @@ impl Router {
             let length = (pair[1].at - pair[0].at).norm();
             let fed = area * length / filament.area * filament.multiplier;
             let melts = filament.volume_per_second / (area * filament.multiplier);
-            self.stroke(Kind::Print, pair[1].at, fed, wanted.min(melts));
+            self.lay(pair[1].at, fed, wanted.min(melts));
             if let Some(printed) = &mut self.printed {
                 printed.add(&pair[0].at, &pair[1].at);
             }

@@ -261,6 +261,7 @@ mod tests {
                 to: Point3::new(p[0], p[1], 5.0),
                 filament: 0.0,
                 speed,
+                continues: false,
             })
             .collect();
         let legs: Vec<Leg> = resampler.legs(&strokes).unwrap().into_iter().flatten().collect();

@@ -47,6 +47,7 @@ fn printer(alignment: Alignment, at: Point3<f64>) -> Printer {
         bed_jerk: 0.5,
         filament_speed: 50.0,
         nozzle_diameter: 0.4,
+        nozzle: machine::profile::NozzleShape::COMMON,
         axis_clearance: 0.02,
         moves_per_second: 500.0,
         home: POLAR.rounded_joints(&home),
@@ -71,7 +72,13 @@ fn lines_are_cut_as_often_as_published() {
         let eps = number(case, "eps");
         let params = ResampleParams { chord: eps, travel_chord: eps, dialect: POLAR, azimuth: 0.0 };
         let mut resampler = Resampler::new(&printer(alignment(model), point("p0")), params);
-        let stroke = Stroke { kind: Kind::Print, to: point("p1"), filament: 1.0, speed: 50.0 };
+        let stroke = Stroke {
+            kind: Kind::Print,
+            to: point("p1"),
+            filament: 1.0,
+            speed: 50.0,
+            continues: false,
+        };
         let legs = resampler.legs(&[stroke]).unwrap();
         let (count, published) = (legs[0].len() as f64, number(case, "count"));
         // Positions are rounded to a thousandth, a tenth of some tolerances here: a piece that is

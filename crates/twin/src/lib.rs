@@ -21,11 +21,13 @@ pub mod family;
 pub mod finding;
 pub mod nearest;
 pub mod picture;
+mod pile;
 pub mod replay;
 pub mod rounding;
 #[cfg(test)]
 mod sample;
 pub mod section;
 pub mod segment;
+pub mod thorough;
 pub mod totals;
 pub mod verify;

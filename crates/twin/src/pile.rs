@@ -10,7 +10,7 @@ use nalgebra::{Point2, Point3};
 use crate::family::Family;
 
 /// Width of a cell, mm: a quarter of a narrow bead.
-pub const CELL: f64 = 0.1;
+pub(crate) const CELL: f64 = 0.1;
 
 /// Cells along the side of a tile.
 const TILE: usize = 64;
@@ -294,7 +294,6 @@ mod tests {
         let covered = f64::from(first.covered) * CELL * CELL;
         let area = 10.0 * 0.45 + std::f64::consts::PI * 0.225 * 0.225;
         assert!((covered / area - 1.0).abs() < 0.15, "{covered} {area}");
-        // One and a half layers above the bed.
         let second = pile.lay(&piece(0.0, 0.4, 1, 1));
         assert_eq!((second.share(), second.taken_share()), (1.0, 0.0));
         let beside = pile.lay(&piece(0.2, 0.6, 2, 2));

@@ -244,6 +244,8 @@ impl Replay {
             Some([from, to]) => Curve::between_joints(from, to, &self.alignment),
             None => Curve::between_points(&from.part, &to.part, &self.alignment),
         };
+        let halfway = self.alignment.part_from_bed(&curve.over_bed(0.5));
+        let middle = Point3::new(halfway.x, halfway.y, f64::midpoint(from.part.z, to.part.z));
         let path = curve.length();
         let distance = if path > 0.0 { path } else { filament.abs() };
         let duration = self.duration(from, path, filament);
@@ -255,6 +257,7 @@ impl Replay {
             width: self.width,
             joints,
             part: [from.part, to.part],
+            middle,
             nearest: curve.nearest_to_axis(),
             curve,
             path,

@@ -3,7 +3,6 @@
 use nalgebra::Point3;
 
 use crate::curve::Curve;
-use machine::kinematics::Alignment;
 use machine::program::{Feed, Joints, Role};
 
 /// What a segment does.
@@ -38,6 +37,8 @@ pub struct Segment {
     pub joints: Option<[Joints; 2]>,
     /// Where the nozzle is in the part at both ends, mm.
     pub part: [Point3<f64>; 2],
+    /// Where it is halfway, mm: on an arc, far from the middle of the chord.
+    pub middle: Point3<f64>,
     /// The path over the bed.
     pub curve: Curve,
     /// The length of the path over the part, lift included, mm.
@@ -78,14 +79,6 @@ impl Segment {
     #[must_use]
     pub fn extrudes(&self) -> bool {
         self.path > 0.0 && self.filament > 0.0
-    }
-
-    /// Returns where in the part the nozzle is when half of the move is done, mm.
-    #[must_use]
-    pub fn middle(&self, alignment: &Alignment) -> Point3<f64> {
-        let over_part = alignment.part_from_bed(&self.curve.over_bed(0.5));
-        let z = f64::midpoint(self.part[0].z, self.part[1].z);
-        Point3::new(over_part.x, over_part.y, z)
     }
 
     /// Returns how far the bed turns, radians; zero in part coordinates.

@@ -5,7 +5,8 @@
 //! use twin::verify::{Setup, Verifier};
 //! # fn example(printer: &machine::profile::Printer, mesh: &mesh::mesh::Mesh, text: &str) {
 //! let filament_area = 2.405;
-//! let setup = Setup { printer, dialect: POLAR, filament_area, mesh: Some(mesh), solid: false };
+//! let setup = Setup { printer, dialect: POLAR, filament_area, mesh: Some(mesh), solid: false,
+//!                     thorough: false };
 //! let mut verifier = Verifier::new(setup);
 //! for line in text.lines() {
 //!     verifier.line(line);
@@ -16,7 +17,8 @@
 //! ```
 //!
 //! Nothing is allocated for a line without a finding, outside the begin of a layer; memory is the
-//! sums of the layers, the findings kept, and an index of the mesh by height.
+//! sums of the layers, the findings kept, and an index of the mesh by height; a thorough proof also
+//! keeps the heights of what was laid.
 
 use machine::gcode::dialect::{Dialect, Space};
 use machine::profile::Printer;
@@ -39,6 +41,7 @@ use crate::replay::{Event, Heating, LayerMark, Replay, read};
 use crate::rounding::Doubt;
 use crate::section::{Section, Sweep, surface, volume};
 use crate::segment::Segment;
+use crate::thorough::Watch;
 use crate::totals::{Tally, Totals};
 
 /// What a program is judged by.
@@ -54,6 +57,8 @@ pub struct Setup<'a> {
     pub mesh: Option<&'a Mesh>,
     /// Whether the print is meant to be solid.
     pub solid: bool,
+    /// Whether to remember all that was laid, and to judge what lies below and around.
+    pub thorough: bool,
 }
 
 /// What came of it.
@@ -94,6 +99,7 @@ pub struct Verifier<'a> {
     surface: Surface,
     volume: Volume,
     deposit: Deposit,
+    watch: Option<Watch<'a>>,
     part: Option<Part<'a>>,
     setup: Setup<'a>,
 }
@@ -134,6 +140,7 @@ impl<'a> Verifier<'a> {
             surface: Surface::new(printer),
             volume: Volume::new(filament_area, printer.nozzle_diameter),
             deposit: Deposit::default(),
+            watch: setup.thorough.then(|| Watch::new(&setup)),
             part: mesh.map(Part::new),
             setup,
         }
@@ -178,7 +185,8 @@ impl<'a> Verifier<'a> {
                  bed and carriage are not judged",
             );
         }
-        let totals = self.totals();
+        let thorough = self.watch.as_mut().map(|watch| watch.finish(&mut self.findings));
+        let totals = Totals { thorough, ..self.totals() };
         let (findings, omitted) = self.findings.into_parts();
         Verdict { findings, omitted, notes, totals }
     }
@@ -235,6 +243,9 @@ impl<'a> Verifier<'a> {
         if self.part.is_some() {
             self.deposit.segment(segment);
         }
+        if let Some(watch) = &mut self.watch {
+            watch.segment(segment, findings);
+        }
     }
 
     fn wait(&mut self, heating: Heating) {
@@ -247,6 +258,9 @@ impl<'a> Verifier<'a> {
         self.end_layer();
         self.continuity.layer(mark, &mut self.findings);
         self.surface.layer(mark);
+        if let Some(watch) = &mut self.watch {
+            watch.layer(mark, &mut self.findings);
+        }
         let is_planar = mark.family.unwrap_or_default() == Family::Planar;
         let middle = mark.top.zip(mark.height).map(|(top, height)| top - height / 2.0);
         let middle = middle.filter(|_| is_planar);
@@ -294,6 +308,7 @@ impl<'a> Verifier<'a> {
             deviation: self.continuity.worst_deviation(),
             nearest_to_axis,
             surface_residual: self.surface.worst(),
+            thorough: None,
         }
     }
 }

@@ -249,12 +249,18 @@ impl Reader {
         let speed = self.speed;
         if to == self.at {
             let pieces = (filament.abs() / LONGEST_FILAMENT_MM).ceil().max(1.0);
-            let stroke = Stroke { kind: Kind::Filament, to, filament: filament / pieces, speed };
+            let stroke = Stroke {
+                kind: Kind::Filament,
+                to,
+                filament: filament / pieces,
+                speed,
+                continues: false,
+            };
             strokes.extend(std::iter::repeat_n(stroke, pieces as usize));
             return;
         }
         let kind = if filament > 0.0 { Kind::Print } else { Kind::Travel };
-        strokes.push(Stroke { kind, to, filament, speed });
+        strokes.push(Stroke { kind, to, filament, speed, continues: false });
         self.at = to;
     }
 }

@@ -3,8 +3,8 @@
 //! * No segment turns the bed by more than half a turn: a longer one is a wrapped angle that was
 //!   not unwrapped.
 //! * No extruding segment leaves its chord by more than [`JUMP`] farther than [`NEAR_AXIS`] from
-//!   the axis: joint-linear moves are subdivided so that they follow straight lines, and one that
-//!   does not was not. `Custom` lines are free: priming along an arc about the axis is natural.
+//!   the axis, unless it turns the bed by no more than [`ARC`]: joint-linear moves follow straight
+//!   lines only in pieces, and arcs about the axis in pieces of any length. `Custom` lines are free: priming along an arc about the axis is natural.
 //! * Material is laid only with the filament at the nozzle's tip: what was drawn back must have
 //!   been pushed forward again, and no more than that. How the print before left the filament is
 //!   not known, so before the first time that it is drawn back anything may be pushed, and for
@@ -24,6 +24,10 @@ pub const NAME: &str = "continuity";
 /// Distance from the chord that makes an extruding segment a jump, mm. Paths are subdivided to
 /// 0.005 mm; a missed subdivision is off by tenths of a millimetre and more.
 pub const JUMP: f64 = 0.05;
+
+/// Turn of the bed up to which an extruding segment may be an arc or a piece of a spiral, radians:
+/// 16°. Whether it lies where the part is, other checks say.
+pub const ARC: f64 = 16.0 * std::f64::consts::PI / 180.0;
 
 /// Nearer to the axis a jump is not looked for, mm: a line that passes there has to leave its
 /// chord for the bed's sake, and `axis` and `speed` watch it.
@@ -108,7 +112,8 @@ impl Continuity {
         }
         let deviation = segment.curve.deviation(NEAR_AXIS);
         self.worst_deviation = self.worst_deviation.max(deviation);
-        if exceeds(deviation, JUMP) || bound.is_nan() {
+        let is_arc = segment.bed_change().abs() <= ARC;
+        if (exceeds(deviation, JUMP) && !is_arc) || bound.is_nan() {
             findings.error(NAME, Place::end_of(segment), (deviation, JUMP), || {
                 format!(
                     "a line that lays material bows {deviation:.3} mm from straight, at most \
@@ -191,10 +196,10 @@ mod tests {
         let pi = std::f64::consts::PI;
         assert_eq!(found(&[polar_segment([20.0, 0.0], [20.0, pi], 20.0)]), []);
         assert_eq!(found(&[polar_segment([20.0, 0.0], [20.0, -1.01 * pi], 20.0)]), [pi]);
-        // The sagitta of an arc of 20 mm radius: 20·φ²/8.
-        assert_eq!(found(&[laid(polar_segment([20.0, 0.0], [20.0, 0.14], 20.0))]), []);
-        assert_eq!(found(&[laid(polar_segment([20.0, 0.0], [20.0, 0.15], 20.0))]), [JUMP]);
-        assert_eq!(found(&[polar_segment([20.0, 0.0], [20.0, 0.15], 20.0)]), []);
+        let within = 0.99 * ARC;
+        assert_eq!(found(&[laid(polar_segment([20.0, 0.0], [20.0, within], 20.0))]), []);
+        assert_eq!(found(&[laid(polar_segment([20.0, 0.0], [20.0, 1.01 * ARC], 20.0))]), [JUMP]);
+        assert_eq!(found(&[polar_segment([20.0, 0.0], [20.0, 1.01 * ARC], 20.0)]), []);
         assert_eq!(found(&[laid(polar_segment([0.9, 0.0], [0.9, 2.0], 20.0))]), []);
         let mut priming = laid(polar_segment([20.0, 0.0], [20.0, 1.5], 20.0));
         priming.role = Role::Custom;

@@ -101,7 +101,7 @@ impl Deposit {
             let off = (from.z - self.top).abs().max((to.z - self.top).abs());
             self.is_sound = !exceeds(off, rounding::IN_PLANE);
         }
-        let middle = nalgebra::center(from, to);
+        let middle = segment.middle;
         let along = to - from;
         let aside = self.family.normal(&middle).cross(&along);
         let length = aside.norm();

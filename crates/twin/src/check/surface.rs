@@ -16,7 +16,6 @@
 //! A program that announces its surfaces (see [`crate::family`]) claims all this, and what is found
 //! is an error. Of others it is a warning: a wall that climbs in a helix is printed on purpose.
 
-use machine::kinematics::Alignment;
 use machine::profile::Printer;
 use machine::program::Role;
 use nalgebra::Point3;
@@ -40,7 +39,6 @@ pub const ROUND_AXIS: f64 = 2.0;
 /// Gathers the levels of a layer, and judges it when it ends.
 #[derive(Debug)]
 pub(crate) struct Surface {
-    alignment: Alignment,
     /// Nearer to the axis cones are not judged, mm.
     tip: f64,
     mark: Option<LayerMark>,
@@ -62,7 +60,6 @@ impl Surface {
     #[must_use]
     pub(crate) fn new(printer: &Printer) -> Self {
         Self {
-            alignment: printer.alignment,
             tip: ROUND_AXIS * printer.axis_clearance,
             mark: None,
             samples: Vec::new(),
@@ -92,7 +89,7 @@ impl Surface {
         };
         sample(segment.part[0]);
         if family != Family::Planar {
-            sample(segment.middle(&self.alignment));
+            sample(segment.middle);
         }
         sample(segment.part[1]);
     }

@@ -115,7 +115,7 @@ const PART: [Mutation; 17] = [
         let at = wall(lines);
         word(lines, at, 'T', |t| t - 360.0);
     }),
-    ("continuity", |lines| {
+    ("deposit", |lines| {
         let at = wall(lines);
         word(lines, at, 'R', |r| r + 1.5);
         word(lines, at, 'T', |t| t + 9.0);
@@ -147,7 +147,7 @@ const PART: [Mutation; 17] = [
     }),
     ("deposit", |lines| {
         let at = wall(lines);
-        word(lines, at, 'R', |r| r - 0.08);
+        word(lines, at, 'R', |r| r - 0.1);
     }),
     ("deposit", |lines| replace(lines, ";WIDTH:0.45", ";WIDTH:0.52")),
 ];

@@ -33,6 +33,7 @@ pub(crate) fn printer() -> Printer {
         bed_jerk: 0.0,
         filament_speed: 40.0,
         nozzle_diameter: 0.4,
+        nozzle: machine::profile::NozzleShape::COMMON,
         axis_clearance: 0.5,
         moves_per_second: 1000.0,
         home: Joints { s: 100.0, turn: BedTurn::default(), z: 20.0 },
@@ -134,6 +135,7 @@ pub(crate) fn judged(lines: &[String], printer: &Printer) -> Verdict {
         filament_area: FILAMENT_AREA,
         mesh: Some(&mesh),
         solid: true,
+        thorough: false,
     };
     let mut verifier = Verifier::new(setup);
     for line in lines {
@@ -172,6 +174,7 @@ fn a_cartesian_program_is_judged_without_joints() {
         filament_area: FILAMENT_AREA,
         mesh: None,
         solid: false,
+        thorough: false,
     };
     let mut verifier = Verifier::new(setup);
     for line in text.lines() {
