@@ -7,7 +7,8 @@
 //! * The flat face may press [`PRESSED`] layers deep into earlier layers: it irons what is uphill of
 //!   it. What the present layer laid is soft, and the face drags through it wherever a
 //!   layer slopes; that is not judged.
-//! * Cone and block may touch what lies beyond the face to [`TOUCHED`], whatever laid it.
+//! * Cone and block may touch what earlier layers laid beyond the face to [`TOUCHED`], and what the
+//!   present layer laid beyond [`SOFT`] faces.
 //!
 //! mm, part frame.
 
@@ -27,6 +28,9 @@ pub const PRESSED: f64 = 1.0;
 /// How deep cone and block may reach into what was laid, mm: half a layer, and what a cell of the
 /// pile rises on a slope of 45°.
 pub const TOUCHED: f64 = 0.1 + CELL;
+
+/// How far around the nozzle what the present layer laid is soft, in radii of the face.
+pub const SOFT: f64 = 2.0;
 
 /// After so many findings no more are looked for: the program is unprintable, and each costs time.
 pub const ENOUGH: usize = 1000;
@@ -60,10 +64,16 @@ impl Clear {
         let face = self.nozzle.flat_radius;
         let pressed = pile.peak(&tip.xy(), face, Some(layer), |_| tip.z);
         self.judge("the face of the nozzle", pressed, PRESSED * thickness, place, findings);
-        // Under the face the cone is as high as at its rim, plus what the face irons.
-        let outline =
-            |distance: f64| tip.z + self.nozzle.height(distance.max(face + CELL)).max(thickness);
-        let hit = pile.peak(&tip.xy(), self.nozzle.block_radius, None, outline);
+        let outline = |distance: f64| tip.z + self.nozzle.height(distance).max(thickness);
+        // Under the face the cone is as high as at its rim.
+        let rim = |rim: f64| move |distance: f64| outline(distance.max(rim));
+        let radius = self.nozzle.block_radius;
+        let earlier = pile.peak(&tip.xy(), radius, Some(layer), rim(face + CELL));
+        let present = pile.peak(&tip.xy(), radius, None, rim(SOFT * face));
+        let hit = match (earlier, present) {
+            (Some(a), Some(b)) => Some(if b.above > a.above { b } else { a }),
+            (a, b) => a.or(b),
+        };
         self.judge("the hot end", hit, TOUCHED, place, findings);
     }
 
