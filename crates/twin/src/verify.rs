@@ -28,6 +28,7 @@ use crate::check::acceleration::Acceleration;
 use crate::check::axis::Clearance;
 use crate::check::continuity::Continuity;
 use crate::check::deposit::{Deposit, Solid};
+use crate::check::flow::Flow;
 use crate::check::heat::Heat;
 use crate::check::modes::Modes;
 use crate::check::reach::Reach;
@@ -97,6 +98,7 @@ pub struct Verifier<'a> {
     continuity: Continuity,
     heat: Heat,
     surface: Surface,
+    flow: Flow,
     volume: Volume,
     deposit: Deposit,
     watch: Option<Watch<'a>>,
@@ -138,6 +140,7 @@ impl<'a> Verifier<'a> {
             continuity: Continuity::default(),
             heat: Heat::new(printer),
             surface: Surface::new(printer),
+            flow: Flow::new(printer, filament_area),
             volume: Volume::new(filament_area, printer.nozzle_diameter),
             deposit: Deposit::default(),
             watch: setup.thorough.then(|| Watch::new(&setup)),
@@ -175,6 +178,7 @@ impl<'a> Verifier<'a> {
         self.acceleration.rest(&mut self.findings);
         self.continuity.end(place, &mut self.findings);
         self.heat.end(place, &mut self.findings);
+        self.flow.end(place, &mut self.findings);
         let enclosed =
             self.setup.mesh.map(|mesh| Enclosed { volume: volume(mesh), surface: surface(mesh) });
         let unjudged = self.volume.end(enclosed, self.setup.solid, &mut self.findings);
@@ -239,6 +243,7 @@ impl<'a> Verifier<'a> {
         self.continuity.segment(segment, findings);
         self.heat.segment(segment, findings);
         self.surface.segment(segment);
+        self.flow.segment(segment, &doubt, findings);
         self.volume.segment(segment);
         if self.part.is_some() {
             self.deposit.segment(segment);
@@ -258,6 +263,7 @@ impl<'a> Verifier<'a> {
         self.end_layer();
         self.continuity.layer(mark, &mut self.findings);
         self.surface.layer(mark);
+        self.flow.layer(mark);
         if let Some(watch) = &mut self.watch {
             watch.layer(mark, &mut self.findings);
         }

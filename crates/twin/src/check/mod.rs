@@ -7,7 +7,7 @@
 //!
 //! On the text: [`text`], [`modes`]. On the machine: [`reach`], [`axis`], [`speed`],
 //! [`acceleration`], [`heat`]. On the part: [`continuity`], [`surface`],
-//! [`volume`], [`deposit`]. On what lies below and around, where a full proof is asked for:
+//! [`flow`], [`volume`], [`deposit`]. On what lies below and around, where a full proof is asked for:
 //! [`support`], [`overlap`], [`coverage`], [`clearance`].
 
 pub mod acceleration;
@@ -16,6 +16,7 @@ pub mod clearance;
 pub mod continuity;
 pub mod coverage;
 pub mod deposit;
+pub mod flow;
 pub mod heat;
 pub mod modes;
 pub mod overlap;
