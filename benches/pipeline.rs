@@ -118,7 +118,9 @@ fn stages(criterion: &mut Criterion) {
         });
         group.bench_function(BenchmarkId::from_parameter("verify"), |bencher| {
             let part = Some(part(&model.outcome));
-            bencher.iter(|| check(model.program.as_slice(), &job, part, |_| {}).unwrap().totals);
+            bencher.iter(|| {
+                check(model.program.as_slice(), &job, part, false, |_| {}).unwrap().totals
+            });
         });
         group.finish();
     }

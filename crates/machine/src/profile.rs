@@ -24,6 +24,8 @@ pub struct Printer {
     pub filament_speed: f64,
     /// The bore of the nozzle, mm.
     pub nozzle_diameter: f64,
+    /// What of the hot end may run into the print.
+    pub nozzle: NozzleShape,
     /// Nothing that is emitted comes nearer to the axis than this, unless it runs straight
     /// through it on a rail that allows so, mm.
     pub axis_clearance: f64,
@@ -44,6 +46,43 @@ pub struct Printer {
     /// Most turns of the bed from where it was homed, either way, radians; infinite where no wire
     /// runs to the bed.
     pub most_turn: f64,
+}
+
+/// The outline of nozzle and hot end, turned about the nozzle's axis: a flat face around the bore, a
+/// cone, and a block above. Lengths mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NozzleShape {
+    /// Radius of the flat face.
+    pub flat_radius: f64,
+    /// Half the angle of the cone, from the axis, radians.
+    pub half_angle: f64,
+    /// Height of the underside of the block above the face.
+    pub block_height: f64,
+    /// How far the block reaches from the axis.
+    pub block_radius: f64,
+}
+
+impl NozzleShape {
+    /// A common brass nozzle for filament of 1.75 mm in a block of 40 mm.
+    pub const COMMON: Self = Self {
+        flat_radius: 0.5,
+        half_angle: std::f64::consts::FRAC_PI_6,
+        block_height: 12.0,
+        block_radius: 20.0,
+    };
+
+    /// Returns how high the outline lies above the face at a distance from the axis, mm; infinite
+    /// beyond the block.
+    #[must_use]
+    pub fn height(&self, distance: f64) -> f64 {
+        if distance <= self.flat_radius {
+            0.0
+        } else if distance <= self.block_radius {
+            ((distance - self.flat_radius) / self.half_angle.tan()).min(self.block_height)
+        } else {
+            f64::INFINITY
+        }
+    }
 }
 
 /// A straight axis.
@@ -81,5 +120,19 @@ impl Printer {
     #[must_use]
     pub fn passes_centre(&self) -> bool {
         self.rail.min < 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nozzle_rises_from_its_face_to_the_block() {
+        let nozzle = NozzleShape::COMMON;
+        assert_eq!((nozzle.height(0.0), nozzle.height(0.5)), (0.0, 0.0));
+        assert!((nozzle.height(1.5) - 3.0_f64.sqrt()).abs() < 1e-12);
+        assert_eq!((nozzle.height(8.0), nozzle.height(20.0)), (12.0, 12.0));
+        assert_eq!(nozzle.height(20.1), f64::INFINITY);
     }
 }

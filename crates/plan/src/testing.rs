@@ -16,6 +16,7 @@ pub(crate) fn printer() -> Printer {
         bed_jerk: 0.5,
         filament_speed: 50.0,
         nozzle_diameter: 0.4,
+        nozzle: machine::profile::NozzleShape::COMMON,
         axis_clearance: 0.02,
         moves_per_second: 500.0,
         home: Joints { s: 120.0, turn: BedTurn::default(), z: 5.0 },

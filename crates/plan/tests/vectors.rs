@@ -47,6 +47,7 @@ fn printer(alignment: Alignment, at: Point3<f64>) -> Printer {
         bed_jerk: 0.5,
         filament_speed: 50.0,
         nozzle_diameter: 0.4,
+        nozzle: machine::profile::NozzleShape::COMMON,
         axis_clearance: 0.02,
         moves_per_second: 500.0,
         home: POLAR.rounded_joints(&home),

@@ -236,9 +236,22 @@ pub struct Slice {
     /// Write the mesh exactly as it was sliced
     #[arg(long, value_name = "FILE.stl")]
     pub export_placed: Option<PathBuf>,
+    /// How far to check the finished program: all that is quick, or support, overlap and clearance
+    /// of every bead too
+    #[arg(long, value_enum, default_value_t = Proof::Quick)]
+    pub verify: Proof,
     /// Do not check the finished program
-    #[arg(long)]
+    #[arg(long, conflicts_with = "verify")]
     pub no_verify: bool,
+}
+
+/// How far a program is checked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Proof {
+    /// Text, machine, and every bead by itself.
+    Quick,
+    /// What lies below and around every bead, too.
+    Full,
 }
 
 /// Arguments of `inspect`.
@@ -354,6 +367,13 @@ pub struct Verify {
     /// The mesh as it was sliced (see `slice --export-placed`)
     #[arg(long, value_name = "PLACED.stl")]
     pub model: Option<PathBuf>,
+    /// How far to check: all that is quick, or support, overlap and clearance of every bead too
+    #[arg(long, value_enum, default_value_t = Proof::Full)]
+    pub proof: Proof,
+    /// Run the program on a machine that misses the ideal one like this, and say how far the part
+    /// is off
+    #[arg(long, value_name = "CAL.toml")]
+    pub machine_error: Option<PathBuf>,
     /// Which settings to use; the dialect is the one that the program names
     #[command(flatten)]
     pub settings: SettingsArguments,

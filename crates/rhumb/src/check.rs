@@ -11,7 +11,8 @@ use crate::failure::Failure;
 use crate::report;
 use crate::settings::Job;
 
-/// Reads a program line by line and judges it; `each` sees every motion.
+/// Reads a program line by line and judges it, `thorough`ly or as fast as it can; `each` sees every
+/// motion.
 ///
 /// # Errors
 ///
@@ -20,6 +21,7 @@ pub fn check(
     mut program: impl BufRead,
     job: &Job,
     part: Option<&Mesh>,
+    thorough: bool,
     mut each: impl FnMut(&Segment),
 ) -> Result<Verdict, Failure> {
     let mut verifier = Verifier::new(Setup {
@@ -28,6 +30,7 @@ pub fn check(
         filament_area: job.plan.filament.area,
         mesh: part,
         solid: job.paths.skins.all_solid,
+        thorough,
     });
     let mut line = Vec::new();
     loop {

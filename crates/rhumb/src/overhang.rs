@@ -51,7 +51,7 @@ mod tests {
     fn cones_carry_what_planes_do_not() {
         let mushroom = shapes::mushroom(96);
         let limit = 45.0_f64.to_radians();
-        let cone = Cone::new(40.0_f64.to_radians()).unwrap();
+        let cone = Cone::new(46.0_f64.to_radians()).unwrap();
         let found = overhangs(&mushroom, &cone, limit);
         assert!(found.planar > 1000.0, "{found:?}");
         assert!(found.chosen < 0.2 * found.planar, "{found:?}");

@@ -219,7 +219,7 @@ fn worst_off_square(settings: &Settings, job: &Job, machine: &Job) -> f64 {
     let watch = &mut Watch { progress: &mut Silent, interrupt: &Interrupt::default() };
     slice(&request, &mut program, watch).expect("it can be sliced");
     let mut places = Vec::new();
-    check(program.as_slice(), machine, None, |segment| {
+    check(program.as_slice(), machine, None, false, |segment| {
         if segment.extrudes() && segment.role == Role::ExternalPerimeter {
             for k in 0..=4 {
                 let over_bed = segment.curve.over_bed(f64::from(k) / 4.0);

@@ -78,7 +78,7 @@ fn every_dialect_prints_the_source() {
         let machine: Printer = job.printer.clone();
         let (text, converted) = converted(&square(), &job, [100.0, 100.0]).unwrap();
         let (mut fed, mut walls) = (0.0, 0);
-        let verdict = check(text.as_bytes(), &job, None, |segment| {
+        let verdict = check(text.as_bytes(), &job, None, false, |segment| {
             fed += segment.filament;
             if segment.extrudes() && segment.role == Role::ExternalPerimeter {
                 for k in 0..=8 {
@@ -145,7 +145,7 @@ fn arcs_and_absolute_filament() {
     let job = job("generic-polar");
     let (text, converted) = converted(source, &job, [0.0, 0.0]).unwrap();
     let mut circle = 0;
-    check(text.as_bytes(), &job, None, |segment| {
+    check(text.as_bytes(), &job, None, false, |segment| {
         if segment.extrudes() {
             for k in 0..=8 {
                 let radius = segment.curve.radius(f64::from(k) / 8.0);

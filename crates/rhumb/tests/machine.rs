@@ -41,7 +41,7 @@ fn program(mesh: &Mesh, settings: &Settings, job: &Job) -> Vec<u8> {
     let mut text = Vec::new();
     let watch = &mut Watch { progress: &mut Silent, interrupt: &Interrupt::default() };
     let outcome = slice(&request, &mut text, watch).expect("it can be sliced");
-    let verdict = check(text.as_slice(), job, Some(part(&outcome)), |_| {}).expect("memory");
+    let verdict = check(text.as_slice(), job, Some(part(&outcome)), false, |_| {}).expect("memory");
     let errors: Vec<_> =
         verdict.findings.iter().filter(|f| f.severity == Severity::Error).take(3).collect();
     assert!(errors.is_empty(), "{}: {errors:?}", job.dialect.name);
@@ -61,7 +61,7 @@ fn outer_wall(text: &[u8], job: &Job, machine: &Printer) -> Vec<Point2<f64>> {
             }
         }
     };
-    check(text, &job, None, each).expect("memory");
+    check(text, &job, None, false, each).expect("memory");
     assert!(places.len() > 100);
     places
 }
@@ -166,7 +166,7 @@ fn wires_to_the_bed_bound_its_turn() {
     let (settings, job) = job("generic-polar", &["turns_max=4", "fill_density=0"]);
     let text = program(&shapes::block(30.0, 30.0, 4.0), &settings, &job);
     let (mut most, mut turned): (f64, f64) = (0.0, 0.0);
-    check(text.as_slice(), &job, None, |segment| {
+    check(text.as_slice(), &job, None, false, |segment| {
         if let Some([from, to]) = segment.joints {
             most = most.max(to.turn.radians().abs() / std::f64::consts::TAU);
             turned += (to.turn.radians() - from.turn.radians()).abs() / std::f64::consts::TAU;

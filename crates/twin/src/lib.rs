@@ -23,11 +23,13 @@ pub mod finding;
 pub mod magnets;
 pub mod nearest;
 pub mod picture;
+mod pile;
 pub mod replay;
 pub mod rounding;
 #[cfg(test)]
 mod sample;
 pub mod section;
 pub mod segment;
+pub mod thorough;
 pub mod totals;
 pub mod verify;

@@ -20,6 +20,7 @@ pub(crate) fn printer() -> Printer {
         bed_jerk: 0.0,
         filament_speed: 40.0,
         nozzle_diameter: 0.4,
+        nozzle: machine::profile::NozzleShape::COMMON,
         axis_clearance: 0.5,
         moves_per_second: 1000.0,
         home: joints(100.0, 0.0, 20.0),

@@ -4,6 +4,7 @@ use machine::program::Role;
 
 use crate::check::volume::LayerVolume;
 use crate::segment::{Kind, Segment};
+use crate::thorough::Thorough;
 
 /// Moves shorter than this strain a firmware without changing the part, mm.
 pub const SHORT: f64 = 0.02;
@@ -55,6 +56,8 @@ pub struct Totals {
     pub nearest_to_axis: f64,
     /// Greatest distance of a bead from the surface of its layer, mm.
     pub surface_residual: f64,
+    /// What only a thorough proof knows.
+    pub thorough: Option<Thorough>,
 }
 
 impl Totals {

@@ -5,7 +5,8 @@
 //! use twin::verify::{Setup, Verifier};
 //! # fn example(printer: &machine::profile::Printer, mesh: &mesh::mesh::Mesh, text: &str) {
 //! let filament_area = 2.405;
-//! let setup = Setup { printer, dialect: POLAR, filament_area, mesh: Some(mesh), solid: false };
+//! let setup = Setup { printer, dialect: POLAR, filament_area, mesh: Some(mesh), solid: false,
+//!                     thorough: false };
 //! let mut verifier = Verifier::new(setup);
 //! for line in text.lines() {
 //!     verifier.line(line);
@@ -16,7 +17,8 @@
 //! ```
 //!
 //! Nothing is allocated for a line without a finding, outside the begin of a layer; memory is the
-//! sums of the layers, the findings kept, and an index of the mesh by height.
+//! sums of the layers, the findings kept, and an index of the mesh by height; a thorough proof also
+//! keeps the heights of what was laid.
 
 use machine::gcode::dialect::{Dialect, Space};
 use machine::profile::Printer;
@@ -26,6 +28,7 @@ use crate::check::acceleration::Acceleration;
 use crate::check::axis::Clearance;
 use crate::check::continuity::Continuity;
 use crate::check::deposit::{Deposit, Solid};
+use crate::check::flow::Flow;
 use crate::check::heat::Heat;
 use crate::check::modes::Modes;
 use crate::check::reach::Reach;
@@ -39,6 +42,7 @@ use crate::replay::{Event, Heating, LayerMark, Replay, read};
 use crate::rounding::Doubt;
 use crate::section::{Section, Sweep, surface, volume};
 use crate::segment::Segment;
+use crate::thorough::Watch;
 use crate::totals::{Tally, Totals};
 
 /// What a program is judged by.
@@ -54,6 +58,8 @@ pub struct Setup<'a> {
     pub mesh: Option<&'a Mesh>,
     /// Whether the print is meant to be solid.
     pub solid: bool,
+    /// Whether to remember all that was laid, and to judge what lies below and around.
+    pub thorough: bool,
 }
 
 /// What came of it.
@@ -92,8 +98,10 @@ pub struct Verifier<'a> {
     continuity: Continuity,
     heat: Heat,
     surface: Surface,
+    flow: Flow,
     volume: Volume,
     deposit: Deposit,
+    watch: Option<Watch<'a>>,
     part: Option<Part<'a>>,
     setup: Setup<'a>,
 }
@@ -132,8 +140,10 @@ impl<'a> Verifier<'a> {
             continuity: Continuity::default(),
             heat: Heat::new(printer),
             surface: Surface::new(printer),
+            flow: Flow::new(printer, filament_area),
             volume: Volume::new(filament_area, printer.nozzle_diameter),
             deposit: Deposit::default(),
+            watch: setup.thorough.then(|| Watch::new(&setup)),
             part: mesh.map(Part::new),
             setup,
         }
@@ -168,6 +178,7 @@ impl<'a> Verifier<'a> {
         self.acceleration.rest(&mut self.findings);
         self.continuity.end(place, &mut self.findings);
         self.heat.end(place, &mut self.findings);
+        self.flow.end(place, &mut self.findings);
         let enclosed =
             self.setup.mesh.map(|mesh| Enclosed { volume: volume(mesh), surface: surface(mesh) });
         let unjudged = self.volume.end(enclosed, self.setup.solid, &mut self.findings);
@@ -178,7 +189,8 @@ impl<'a> Verifier<'a> {
                  bed and carriage are not judged",
             );
         }
-        let totals = self.totals();
+        let thorough = self.watch.as_mut().map(|watch| watch.finish(&mut self.findings));
+        let totals = Totals { thorough, ..self.totals() };
         let (findings, omitted) = self.findings.into_parts();
         Verdict { findings, omitted, notes, totals }
     }
@@ -231,9 +243,13 @@ impl<'a> Verifier<'a> {
         self.continuity.segment(segment, findings);
         self.heat.segment(segment, findings);
         self.surface.segment(segment);
+        self.flow.segment(segment, &doubt, findings);
         self.volume.segment(segment);
         if self.part.is_some() {
             self.deposit.segment(segment);
+        }
+        if let Some(watch) = &mut self.watch {
+            watch.segment(segment, findings);
         }
     }
 
@@ -247,6 +263,10 @@ impl<'a> Verifier<'a> {
         self.end_layer();
         self.continuity.layer(mark, &mut self.findings);
         self.surface.layer(mark);
+        self.flow.layer(mark);
+        if let Some(watch) = &mut self.watch {
+            watch.layer(mark, &mut self.findings);
+        }
         let is_planar = mark.family.unwrap_or_default() == Family::Planar;
         let middle = mark.top.zip(mark.height).map(|(top, height)| top - height / 2.0);
         let middle = middle.filter(|_| is_planar);
@@ -294,6 +314,7 @@ impl<'a> Verifier<'a> {
             deviation: self.continuity.worst_deviation(),
             nearest_to_axis,
             surface_residual: self.surface.worst(),
+            thorough: None,
         }
     }
 }

@@ -27,12 +27,12 @@ pub(super) fn run(arguments: &Preview) -> Result<u8, Failure> {
     let picture = match arguments.layer {
         Some(layer) => {
             let mut sink = LayerSink::new(layer, printer);
-            check(program.as_slice(), &job, None, |segment| sink.add(segment))?;
+            check(program.as_slice(), &job, None, false, |segment| sink.add(segment))?;
             layer_svg(sink, printer)
         }
         None => {
             let mut sink = PrintSink::new(MOST_PIECES, printer);
-            check(program.as_slice(), &job, None, |segment| sink.add(segment))?;
+            check(program.as_slice(), &job, None, false, |segment| sink.add(segment))?;
             let shade = match arguments.color_by {
                 Coloring::Height => Shade::Height,
                 Coloring::Role => Shade::Role,

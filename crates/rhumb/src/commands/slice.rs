@@ -7,7 +7,7 @@ use slicer::level::Snap;
 use twin::verify::Verdict;
 
 use super::{DONE, LOOK, display_name, say, say_json, settings, to_json, wish};
-use crate::args::{Manner, Slice};
+use crate::args::{Manner, Proof, Slice};
 use crate::calibration;
 use crate::check::{check, refusal};
 use crate::clock;
@@ -65,8 +65,9 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     } else {
         progress.stage("verify", 1);
         let mut lap = Stopwatch::start();
-        let verdict =
-            check(BufReader::new(out.reread()?), &job, Some(pipeline::part(&outcome)), |_| {})?;
+        let text = BufReader::new(out.reread()?);
+        let full = arguments.verify == Proof::Full;
+        let verdict = check(text, &job, Some(pipeline::part(&outcome)), full, |_| {})?;
         outcome.timings.verify = lap.lap();
         Some(verdict)
     };

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use mesh::health::solid_from_soup;
 use mesh::stl;
+use twin::thorough::Thorough;
 
 use super::{DONE, LOOK, say, say_json, settings};
-use crate::args::{Manner, SettingsArguments, Verify};
+use crate::args::{Manner, Proof, SettingsArguments, Verify};
 use crate::check::{check, findings};
 use crate::failure::Failure;
 use crate::input;
@@ -18,7 +19,8 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
     let program = input::read(&arguments.program)?;
     let job = job_of(&program, &arguments.settings)?;
     let part = arguments.model.as_deref().map(part).transpose()?;
-    let verdict = check(program.as_slice(), &job, part.as_ref(), |_| {})?;
+    let verdict =
+        check(program.as_slice(), &job, part.as_ref(), arguments.proof == Proof::Full, |_| {})?;
     if manner.json {
         say_json(&serde_json::json!({
             "verify": {"findings": findings(&verdict)},
@@ -27,6 +29,7 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
             "filament_mm": verdict.totals.filament,
             "surface_residual_mm": verdict.totals.surface_residual,
             "notes": verdict.notes,
+            "support": verdict.totals.thorough.as_ref().map(support),
         }))?;
     } else {
         let mut out = String::new();
@@ -52,9 +55,48 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
             totals.rail_speed,
             totals.surface_residual * 1e3
         );
+        if let Some(thorough) = &totals.thorough {
+            let _ = writeln!(out, "{}", laid(thorough));
+        }
         say(&out)?;
     }
     Ok(if verdict.findings.is_empty() { DONE } else { LOOK })
+}
+
+/// What lies below and around the beads, as data.
+fn support(thorough: &Thorough) -> serde_json::Value {
+    let support = &thorough.support;
+    serde_json::json!({
+        "laid_mm": support.laid,
+        "carried_mm": support.carried,
+        "over_infill_mm": support.over_infill,
+        "bridged_mm": support.bridged,
+        "hanging_mm": support.hanging,
+        "hanging_beads": support.hanging_beads,
+        "mid_air_beads": support.in_mid_air,
+        "laid_twice_mm": thorough.laid_twice,
+        "deepest_touch_mm": thorough.deepest_touch,
+        "hollow_mm3": thorough.hollow,
+    })
+}
+
+/// One line on what lies below and around the beads.
+fn laid(thorough: &Thorough) -> String {
+    let support = &thorough.support;
+    let share = |length: f64| 100.0 * length / support.laid.max(f64::MIN_POSITIVE);
+    format!(
+        "{:.1} m of beads, {:.2} % carried, {:.2} % over infill, {:.2} % bridges, {:.2} % hanging ({} beads, {} from \
+         mid-air); {:.1} mm laid twice, hot end at most {:.2} mm in the print",
+        support.laid / 1e3,
+        share(support.carried),
+        share(support.over_infill),
+        share(support.bridged),
+        share(support.hanging),
+        support.hanging_beads,
+        support.in_mid_air,
+        thorough.laid_twice,
+        thorough.deepest_touch
+    )
 }
 
 /// The settings to judge a program by: the dialect and the filament are those that it names itself

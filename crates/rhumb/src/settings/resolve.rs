@@ -5,7 +5,7 @@ use machine::gcode::Dialect;
 use machine::gcode::dialect::Space;
 use machine::height_map::HeightMap;
 use machine::kinematics::{Alignment, BedScale};
-use machine::profile::{Axis, Printer, Turntable};
+use machine::profile::{Axis, NozzleShape, Printer, Turntable};
 use machine::program::{BedTurn, Joints};
 use mesh::flats::FlatParams;
 use mesh::orient::OrientParams;
@@ -154,6 +154,12 @@ fn printer(get: &Lookup<'_>) -> Printer {
         bed_jerk: get.number("bed_jerk_deg_per_s").to_radians(),
         filament_speed: get.number("retract_speed_mm_per_s"),
         nozzle_diameter: get.number("nozzle_diameter_mm"),
+        nozzle: NozzleShape {
+            flat_radius: get.number("nozzle_flat_radius_mm"),
+            half_angle: get.number("nozzle_half_angle_deg").to_radians(),
+            block_height: get.number("nozzle_block_height_mm"),
+            block_radius: get.number("nozzle_block_radius_mm"),
+        },
         axis_clearance: get.number("axis_clearance_mm"),
         moves_per_second: get.number("moves_per_second"),
         home: Joints {

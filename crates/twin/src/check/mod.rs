@@ -7,16 +7,22 @@
 //!
 //! On the text: [`text`], [`modes`]. On the machine: [`reach`], [`axis`], [`speed`],
 //! [`acceleration`], [`heat`]. On the part: [`continuity`], [`surface`],
-//! [`volume`], [`deposit`].
+//! [`flow`], [`volume`], [`deposit`]. On what lies below and around, where a full proof is asked for:
+//! [`support`], [`overlap`], [`coverage`], [`clearance`].
 
 pub mod acceleration;
 pub mod axis;
+pub mod clearance;
 pub mod continuity;
+pub mod coverage;
 pub mod deposit;
+pub mod flow;
 pub mod heat;
 pub mod modes;
+pub mod overlap;
 pub mod reach;
 pub mod speed;
+pub mod support;
 pub mod surface;
 pub mod text;
 pub mod volume;

@@ -34,6 +34,7 @@ fn judged(printer: &Printer) -> Verdict {
         filament_area: FILAMENT_AREA,
         mesh: None,
         solid: false,
+        thorough: false,
     };
     let mut verifier = Verifier::new(setup);
     for line in line_past_the_axis().lines() {

@@ -74,7 +74,14 @@ fn text(run: &Run) -> String {
 
 fn findings(run: &Run, printer: &Printer) -> Vec<String> {
     let dialect = POLAR;
-    let setup = Setup { printer, dialect, filament_area: FILAMENT_AREA, mesh: None, solid: false };
+    let setup = Setup {
+        printer,
+        dialect,
+        filament_area: FILAMENT_AREA,
+        mesh: None,
+        solid: false,
+        thorough: false,
+    };
     let mut verifier = Verifier::new(setup);
     for line in text(run).lines() {
         verifier.line(line);

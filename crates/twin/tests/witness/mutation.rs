@@ -1,6 +1,6 @@
 //! One line of a sound program is changed; the check that watches over it must speak up.
 
-use crate::program::{judged, printer, square};
+use crate::program::{ANNOUNCED, judged, printer, square};
 
 /// The check that must find it, and what it does.
 type Mutation = (&'static str, fn(&mut Vec<String>));
@@ -110,7 +110,7 @@ const MACHINE: [Mutation; 22] = [
     ("heat", |lines| remove(lines, "M140 S0")),
 ];
 
-const PART: [Mutation; 17] = [
+const PART: [Mutation; 22] = [
     ("continuity", |lines| {
         let at = wall(lines);
         word(lines, at, 'T', |t| t - 360.0);
@@ -145,11 +145,32 @@ const PART: [Mutation; 17] = [
         let at = wall(lines);
         word(lines, at, 'R', |r| r + 0.08);
     }),
+    ("flow", |lines| {
+        let at = wall(lines);
+        lines.remove(at);
+    }),
+    ("flow", |lines| {
+        let at = wall(lines);
+        lines.swap(at, at + 1);
+    }),
+    ("flow", |lines| {
+        for at in 0..lines.len() {
+            if lines[at].starts_with("G1 R") {
+                word(lines, at, 'E', |e| e * 1.05);
+            }
+        }
+    }),
+    ("surface", |lines| append(lines, " Z0.35")),
+    ("surface", |lines| {
+        for text in lines.iter_mut() {
+            *text = text.replace("Z0.4", "Z0.45").replace(";Z:0.4", ";Z:0.45");
+        }
+    }),
     ("deposit", |lines| {
         let at = wall(lines);
         word(lines, at, 'R', |r| r - 0.1);
     }),
-    ("deposit", |lines| replace(lines, ";WIDTH:0.45", ";WIDTH:0.52")),
+    ("deposit", |lines| replace(lines, ANNOUNCED, ";WIDTH:0.56")),
 ];
 
 #[test]

@@ -16,6 +16,7 @@ fn judge(lines: &[Vec<u8>]) -> usize {
             filament_area: FILAMENT_AREA,
             mesh: Some(&mesh),
             solid: true,
+            thorough: false,
         };
         let mut verifier = Verifier::new(setup);
         for line in lines {

@@ -18,6 +18,9 @@ const HALF: f64 = 20.0;
 /// The width of its only wall, mm.
 const WIDTH: f64 = 0.45;
 
+/// The width that a bead with round sides has which takes the place of that wall, as text.
+pub(crate) const ANNOUNCED: &str = ";WIDTH:0.49";
+
 const HEIGHT: f64 = 0.2;
 const LAYERS: u32 = 3;
 
@@ -33,6 +36,7 @@ pub(crate) fn printer() -> Printer {
         bed_jerk: 0.0,
         filament_speed: 40.0,
         nozzle_diameter: 0.4,
+        nozzle: machine::profile::NozzleShape::COMMON,
         axis_clearance: 0.5,
         moves_per_second: 1000.0,
         home: Joints { s: 100.0, turn: BedTurn::default(), z: 20.0 },
@@ -82,7 +86,7 @@ pub(crate) fn square() -> Vec<String> {
         let _ = write!(
             text,
             ";LAYER_CHANGE\n;Z:{top:.1}\n;HEIGHT:0.2\n;LAYER:{layer}\n\
-             ;TYPE:External perimeter\n;WIDTH:0.45\nG1 Z{top:.1} F600\n"
+             ;TYPE:External perimeter\n{ANNOUNCED}\nG1 Z{top:.1} F600\n"
         );
         // Nothing has been drawn back before the first layer: 20 mm are purged instead.
         let prime = if layer == 0 { "G1 E20 F600\n" } else { "G1 E0.8 F2400\n" };
@@ -134,6 +138,7 @@ pub(crate) fn judged(lines: &[String], printer: &Printer) -> Verdict {
         filament_area: FILAMENT_AREA,
         mesh: Some(&mesh),
         solid: true,
+        thorough: false,
     };
     let mut verifier = Verifier::new(setup);
     for line in lines {
@@ -172,6 +177,7 @@ fn a_cartesian_program_is_judged_without_joints() {
         filament_area: FILAMENT_AREA,
         mesh: None,
         solid: false,
+        thorough: false,
     };
     let mut verifier = Verifier::new(setup);
     for line in text.lines() {

@@ -45,7 +45,7 @@ fn check(artefact: &Artefact, caliper_sd: f64) -> Result<(), Failure> {
     // Pins apart from each other and from the axis, on a bed that exists.
     let is_sound =
         0.5 <= pin && 2.0 * pin <= inner && inner + 4.0 * pin <= outer && outer <= 1000.0;
-    let has_sd = 1e-4 <= caliper_sd && caliper_sd <= 1.0;
+    let has_sd = (1e-4..=1.0).contains(&caliper_sd);
     match (is_sound, has_sd) {
         (true, true) => Ok(()),
         (false, _) => Err(Failure::new(

@@ -1,0 +1,101 @@
+//! Is a solid print solid?
+//!
+//! Where a bead is laid over empty space (see [`crate::pile`]) and that space belongs to the part,
+//! the space is hollow. A layer may leave [`MOST_HOLLOW`] hollow: the corners that no round bead
+//! reaches. mm³, part frame.
+
+use nalgebra::center;
+
+use crate::check::support::Step;
+use crate::finding::{Findings, Place};
+use crate::pile::CELL;
+
+/// The name of this check.
+pub const NAME: &str = "coverage";
+
+/// How much of a layer may lie over empty space inside the part, as a share of what it covers.
+pub const MOST_HOLLOW: f64 = 0.05;
+
+/// And at least this much of it, mm²: a bead of 0.45 mm that is missing over 4 mm.
+pub const LEAST_AREA: f64 = 2.0;
+
+/// Sums the hollow space under each layer.
+#[derive(Debug, Default)]
+pub(crate) struct Hollow {
+    sum: f64,
+    covered: u64,
+    open: u64,
+    /// The piece of the layer over the most empty space.
+    worst: Option<(u32, Place)>,
+}
+
+impl Hollow {
+    /// A bead goes on by a piece.
+    pub(crate) fn piece(&mut self, step: &Step) {
+        let footing = &step.footing;
+        self.covered += u64::from(footing.covered);
+        let open = footing.covered - footing.resting;
+        if open == 0 || !step.is_inside {
+            return;
+        }
+        self.sum += footing.hollow;
+        self.open += u64::from(open);
+        if self.worst.is_none_or(|(most, _)| open > most) {
+            let at = center(&step.ends[0], &step.ends[1]);
+            let place = Place { line: step.line, layer: step.layer, at: Some(at) };
+            self.worst = Some((open, place));
+        }
+    }
+
+    /// Judges the layer that ends.
+    pub(crate) fn end_of_layer(&mut self, findings: &mut Findings) {
+        let (covered, open) = (self.covered as f64, self.open as f64);
+        (self.covered, self.open) = (0, 0);
+        let Some((_, place)) = self.worst.take() else { return };
+        let area = open * CELL * CELL;
+        let share = open / covered;
+        if share > MOST_HOLLOW && area > LEAST_AREA {
+            findings.warning(NAME, place, (share, MOST_HOLLOW), || {
+                format!(
+                    "{area:.1} mm² of the layer, {:.1} % of it, lie over holes in a part that is \
+                     meant to be solid",
+                    100.0 * share
+                )
+            });
+        }
+    }
+
+    /// Returns the hollow space so far, mm³.
+    pub(crate) fn sum(&self) -> f64 {
+        self.sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pile::Footing;
+    use nalgebra::Point3;
+
+    #[test]
+    fn holes_are_found_and_what_is_outside_is_none() {
+        let (mut check, mut findings) = (Hollow::default(), Findings::default());
+        let ends = [Point3::origin(), Point3::new(0.5, 0.0, 0.0)];
+        let mut layer = |open: u32, is_inside: bool| {
+            for line in 0..200 {
+                let open = if line % 10 == 0 { open } else { 0 };
+                let footing = Footing {
+                    covered: 25,
+                    resting: 25 - open,
+                    hollow: f64::from(open) * 0.001,
+                    ..Footing::default()
+                };
+                check.piece(&Step { line, layer: None, ends, footing, is_inside });
+            }
+            check.end_of_layer(&mut findings);
+            findings.kept().len()
+        };
+        assert_eq!([layer(10, true), layer(25, false), layer(25, true)], [0, 0, 1]);
+        assert!((check.sum() - 20.0 * (0.01 + 0.025)).abs() < 1e-12);
+    }
+}

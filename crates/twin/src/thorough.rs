@@ -1,0 +1,205 @@
+//! The checks that need to know all that was laid before: `support`, `overlap`, `clearance` and the
+//! hollow space of `coverage`.
+//!
+//! Every move is taken apart into pieces of at most [`PIECE`]. The nozzle stands over each, and
+//! what it lays is added to the [pile](crate::pile). A line is what is laid without a move between;
+//! it has a number, so that it can be told from its neighbours.
+
+use machine::kinematics::Alignment;
+use machine::program::Role;
+use nalgebra::{Point3, center};
+
+use crate::check::clearance::Clear;
+use crate::check::coverage::Hollow;
+use crate::check::overlap::Overlap;
+use crate::check::support::{Follow, PIECE, Step, Support};
+use crate::columns::Columns;
+use crate::finding::{Findings, Place};
+use crate::pile::{Piece, Pile};
+use crate::replay::LayerMark;
+use crate::rounding;
+use crate::segment::Segment;
+use crate::verify::Setup;
+
+/// What the thorough checks come to. mm, mm³.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Thorough {
+    /// What beads rest on.
+    pub support: Support,
+    /// Length of what was laid twice.
+    pub laid_twice: f64,
+    /// How deep the nozzle reached into what was printed.
+    pub deepest_touch: f64,
+    /// Empty space inside the part, where that is meant to be solid.
+    pub hollow: f64,
+}
+
+/// Knows all that was laid. See the [module](self).
+#[derive(Debug)]
+pub(crate) struct Watch<'a> {
+    alignment: Alignment,
+    filament_area: f64,
+    pile: Pile,
+    mark: Option<LayerMark>,
+    stroke: u32,
+    /// Where the last line ended, until something else happens.
+    end: Option<Point3<f64>>,
+    thickness: f64,
+    follow: Follow,
+    overlap: Overlap,
+    clear: Clear,
+    /// The part, when it is known.
+    part: Option<Columns<'a>>,
+    /// For parts that are meant to be solid.
+    hollow: Option<Hollow>,
+}
+
+/// How far lines may begin from the end of the one before and still go on, mm: the last places.
+const SAME_PLACE: f64 = 3.0 * rounding::LENGTH;
+
+/// Pieces shorter than this have too few digits of filament to tell their thickness, mm.
+const TELLING: f64 = 0.1;
+
+/// A bead thicker than this many layers is a blob whose thickness says nothing.
+const THICKEST: f64 = 2.0;
+
+impl<'a> Watch<'a> {
+    /// Returns the watch over a bare bed.
+    pub(crate) fn new(setup: &Setup<'a>) -> Self {
+        let Setup { printer, filament_area, .. } = *setup;
+        Self {
+            alignment: printer.alignment,
+            filament_area,
+            pile: Pile::new(printer.rail.max.max(-printer.rail.min)),
+            mark: None,
+            stroke: 0,
+            end: None,
+            thickness: 0.0,
+            follow: Follow::default(),
+            overlap: Overlap::default(),
+            clear: Clear::new(printer),
+            part: setup.mesh.map(Columns::new),
+            hollow: setup.solid.then(Hollow::default),
+        }
+    }
+
+    pub(crate) fn layer(&mut self, mark: LayerMark, findings: &mut Findings) {
+        self.end_of_line(findings);
+        if let Some(hollow) = &mut self.hollow {
+            hollow.end_of_layer(findings);
+        }
+        self.thickness = mark.height.unwrap_or_default();
+        self.mark = Some(mark);
+    }
+
+    pub(crate) fn segment(&mut self, segment: &Segment, findings: &mut Findings) {
+        if segment.path <= 0.0 {
+            return;
+        }
+        let lays = segment.extrudes() && segment.role != Role::Custom;
+        let goes_on = self.end.is_some_and(|end| (end - segment.part[0]).norm() < SAME_PLACE);
+        if !lays || !goes_on {
+            self.end_of_line(findings);
+        }
+        let Some(mark) = self.mark else { return };
+        if lays {
+            self.thickness = self.thickness_of(segment, &mark);
+            self.end = Some(segment.part[1]);
+        }
+        let count = (segment.path / PIECE).ceil().max(1.0) as u32;
+        let mut from = segment.part[0];
+        for k in 1..=count {
+            let to = if k == count {
+                segment.part[1]
+            } else {
+                self.at(segment, f64::from(k) / f64::from(count))
+            };
+            self.piece([from, to], lays, segment, &mark, findings);
+            from = to;
+        }
+    }
+
+    /// Ends the program, and returns what it came to.
+    pub(crate) fn finish(&mut self, findings: &mut Findings) -> Thorough {
+        self.end_of_line(findings);
+        if let Some(hollow) = &mut self.hollow {
+            hollow.end_of_layer(findings);
+        }
+        Thorough {
+            support: self.follow.sums(),
+            laid_twice: self.overlap.sum(),
+            deepest_touch: self.clear.deepest(),
+            hollow: self.hollow.as_ref().map_or(0.0, Hollow::sum),
+        }
+    }
+
+    fn end_of_line(&mut self, findings: &mut Findings) {
+        if self.end.take().is_some() {
+            self.follow.end(findings);
+            self.overlap.end(findings);
+            self.stroke += 1;
+        }
+    }
+
+    fn piece(
+        &mut self,
+        ends: [Point3<f64>; 2],
+        lays: bool,
+        segment: &Segment,
+        mark: &LayerMark,
+        findings: &mut Findings,
+    ) {
+        let layer = mark.index as u32;
+        let place = Place { line: segment.line, layer: segment.layer, at: Some(ends[1]) };
+        let height = mark.height.unwrap_or_default();
+        self.clear.tip(&ends[1], (layer, height), place, &self.pile, findings);
+        if !lays {
+            return;
+        }
+        let footing = self.pile.lay(&Piece {
+            ends,
+            half_width: segment.width / 2.0,
+            thickness: self.thickness,
+            family: mark.family.unwrap_or_default(),
+            layer,
+            stroke: self.stroke,
+        });
+        let is_inside = footing.resting < footing.covered && self.is_inside(&ends, segment.role);
+        let step = Step { line: segment.line, layer: segment.layer, ends, footing, is_inside };
+        self.follow.piece(&step, findings);
+        self.overlap.piece(&step, findings);
+        if let Some(hollow) = &mut self.hollow {
+            hollow.piece(&step);
+        }
+    }
+
+    /// Returns whether the place halfway down the layer below belongs to the part; without a mesh,
+    /// whether that is what the bead is for.
+    fn is_inside(&self, ends: &[Point3<f64>; 2], role: Role) -> bool {
+        let Some(part) = &self.part else { return role == Role::InternalInfill };
+        let middle = center(&ends[0], &ends[1]);
+        let normal = self.mark.and_then(|mark| mark.family).unwrap_or_default().normal(&middle);
+        part.winding(&(middle - normal * (1.5 * self.thickness))) != 0
+    }
+
+    /// The thickness of a bead of the announced width that takes the filament of a segment, mm.
+    fn thickness_of(&self, segment: &Segment, mark: &LayerMark) -> f64 {
+        const ROUNDING: f64 = 1.0 - std::f64::consts::FRAC_PI_4;
+        let height = mark.height.unwrap_or_default();
+        if segment.path < TELLING {
+            return self.thickness;
+        }
+        // area = t·(w − t·(1 − π/4)), the smaller root.
+        let area = segment.filament * self.filament_area / segment.path;
+        let width = segment.width;
+        let square = width * width - 4.0 * ROUNDING * area;
+        let thickness = 2.0 * area / (width + square.max(0.0).sqrt());
+        if thickness > 0.0 && thickness < THICKEST * height { thickness } else { height }
+    }
+
+    fn at(&self, segment: &Segment, share: f64) -> Point3<f64> {
+        let over_part = self.alignment.part_from_bed(&segment.curve.over_bed(share));
+        let [from, to] = segment.part.map(|p| p.z);
+        Point3::new(over_part.x, over_part.y, from + (to - from) * share)
+    }
+}
