@@ -98,6 +98,10 @@ const MOST_STROKES: usize = 256;
 /// way round the axis is found stroke by stroke.
 const LONG_MOVE_CLEARANCE_MM: f64 = 1.0;
 
+/// How much the length of a long move may differ from that of its strokes, as a share: a line that
+/// turns back on itself is no single move, however near it stays.
+const LONG_MOVE_LENGTH: f64 = 0.01;
+
 /// Halvings after which a piece is taken as it is; 2⁻⁴⁰ of any stroke is far below a step.
 const MOST_HALVINGS: u32 = 40;
 
@@ -242,9 +246,12 @@ impl Resampler {
         let lengths: Vec<f64> = std::iter::once(&from)
             .chain(targets)
             .zip(targets)
-            .map(|(a, b)| (b.over_bed - a.over_bed).norm())
+            .map(|(a, b)| (b.over_bed - a.over_bed).norm().hypot(b.z - a.z))
             .collect();
         let whole: f64 = lengths.iter().sum();
+        if (self.path_length(&to) - whole).abs() > LONG_MOVE_LENGTH * whole {
+            return false;
+        }
         let mut done = 0.0;
         let mut before = from;
         targets.iter().zip(&lengths).all(|(target, length)| {
@@ -263,7 +270,7 @@ impl Resampler {
     }
 
     /// How far the move to `to` passes from a place that it should reach after about `share` of its
-    /// way.
+    /// way, mm.
     fn distance_at(&self, to: &Joints, share: f64, place: &Target) -> f64 {
         const STEP: f64 = 1e-3;
         let at = |share: f64| {
@@ -733,6 +740,18 @@ mod tests {
             from = leg.to;
         }
         worst
+    }
+
+    #[test]
+    fn a_line_that_turns_back_is_not_one_move() {
+        let back = Stroke { continues: true, ..print(30.2, 0.0) };
+        let strokes = [travel(30.0, 0.0), print(30.4, 0.0), back];
+        let legs = Resampler::new(&printer(), PARAMS).legs(&strokes).unwrap();
+        assert_eq!(legs[1..].iter().map(Vec::len).collect::<Vec<_>>(), [1, 1]);
+        let ahead = Stroke { continues: true, ..print(30.8, 0.0) };
+        let strokes = [travel(30.0, 0.0), print(30.4, 0.0), ahead];
+        let legs = Resampler::new(&printer(), PARAMS).legs(&strokes).unwrap();
+        assert_eq!(legs[1..].iter().map(Vec::len).collect::<Vec<_>>(), [0, 1]);
     }
 
     #[test]

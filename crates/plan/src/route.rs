@@ -124,8 +124,8 @@ pub struct Router {
 /// each other in the same cell of [`Printed`].
 const CLEAR_MM: f64 = 0.1;
 
-/// A line's width may drift by this share before viewers are told.
-const WIDTH_DRIFT: f64 = 0.05;
+/// A line's cross-section may drift by this share before viewers are told its width.
+const AREA_DRIFT: f64 = 0.02;
 
 impl Router {
     /// Returns a router whose nozzle stands at `at`, filament ready. `printed` is the empty bed where
@@ -305,13 +305,13 @@ impl Router {
         filament: &FilamentParams,
     ) {
         let wanted = speeds.of(line.role, is_first_layer);
-        let mut told_width = f64::NAN;
+        let mut told_area = f64::NAN;
         for pair in line.stations.windows(2).flat_map(|pair| in_even_pieces(&pair[0], &pair[1])) {
             let (width, area) = mean(&pair[0], &pair[1]);
-            let drift = (width - told_width).abs();
-            if drift.is_nan() || drift > WIDTH_DRIFT * told_width {
+            let drift = (area - told_area).abs();
+            if drift.is_nan() || drift > AREA_DRIFT * told_area {
                 self.items.push(Item::Step(Step::Bead(program_role(line.role), width)));
-                told_width = width;
+                told_area = area;
             }
             let length = (pair[1].at - pair[0].at).norm();
             let fed = area * length / filament.area * filament.multiplier;
