@@ -3,6 +3,8 @@
 mod file;
 mod fit;
 mod pins;
+mod scan;
+mod serial;
 mod show;
 
 use std::path::{Path, PathBuf};
@@ -17,6 +19,7 @@ use super::display_name;
 pub(super) fn run(calibrate: &Calibrate, manner: &Manner) -> Result<u8, Failure> {
     match calibrate {
         Calibrate::Fit(arguments) => fit::run(arguments, manner),
+        Calibrate::Scan(arguments) => scan::run(arguments, manner),
         Calibrate::Pins(arguments) => pins::run(arguments, manner),
         Calibrate::Show(arguments) => show::run(arguments, manner),
     }
