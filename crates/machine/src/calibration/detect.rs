@@ -8,7 +8,7 @@
 //! the turning bed grow and shrink from one carriage position to the next.
 
 use super::log::{Direction, Edge, Log, Rows, Sample};
-use super::peaks::{Chord, centroid, chord};
+use super::peaks::{Chord, centroid, chord, log_gauss};
 use super::{Sighting, wrap};
 use std::f64::consts::PI;
 
@@ -22,7 +22,12 @@ pub struct Detected {
     /// Magnets that were scanned in one direction only: their place is off by hysteresis and delay,
     /// some 50 µm.
     pub one_way: usize,
+    /// Passages over magnets.
+    pub passes: usize,
 }
+
+/// More passages are no calibration; to sort them would take minutes.
+pub const MOST_PASSES: usize = 20_000;
 
 /// One passage over a magnet.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +46,9 @@ struct Pass {
 /// Passes whose middles are nearer than this are of one magnet, mm across the rail: less than half
 /// the distance at which two magnets can be told apart.
 const SAME_MAGNET_MM: f64 = 2.5;
+
+/// Rows of one magnet lie no farther from its strongest, mm: a magnet shows no wider.
+const SAME_ROWS_MM: f64 = 12.0;
 
 /// Two scans at positions nearer than this are at the same one: below the step of any machine.
 const SAME_PLACE_MM: f64 = 1e-3;
@@ -63,7 +71,10 @@ pub fn magnets(log: &Log, a: f64, b: f64) -> Detected {
         Rows::Edges(edges) => chords(edges),
     };
     let is_digital = matches!(log.rows, Rows::Edges(_));
-    let mut found = Detected::default();
+    let mut found = Detected { passes: passes.len(), ..Detected::default() };
+    if passes.len() > MOST_PASSES {
+        return found;
+    }
     for group in grouped(&passes) {
         let is_one_way = [true, false].iter().any(|&turn| is_one_way(&group, turn));
         match locate(&group, is_digital, a, b) {
@@ -264,8 +275,11 @@ fn locate(group: &[Pass], is_digital: bool, a: f64, b: f64) -> Option<Sighting> 
         let (x, y): (Vec<f64>, Vec<f64>) = rows.iter().copied().unzip();
         // Arcs, not angles, measure how much of a magnet was passed over.
         let y: Vec<f64> = y.iter().zip(&x).map(|(area, s)| area * (s + a).abs()).collect();
-        let top = y.iter().copied().fold(0.0, f64::max);
-        centroid(&x, &y, FOOT_SHARE * top)?
+        // The rows are few and do not reach down to the foot on both sides: a bell curve through
+        // them needs neither.
+        let top = (0..y.len()).max_by(|&i, &j| y[i].total_cmp(&y[j]))?;
+        let middle = log_gauss(&x, &y, [BUMP_SHARE * y[top], y[top]], x[top], SAME_ROWS_MM)?;
+        is_between(&rows, middle).then_some(middle)?
     };
     Some(Sighting { s, theta, is_reversed: group[0].is_reversed })
 }

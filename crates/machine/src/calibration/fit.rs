@@ -120,6 +120,14 @@ pub enum FitError {
         /// How many there may be.
         most: usize,
     },
+    /// The sensor switched more often than it passes magnets.
+    #[error("the sensor saw something {found} times, {most} are the most")]
+    TooManyPasses {
+        /// How often.
+        found: usize,
+        /// How often it may have.
+        most: usize,
+    },
     /// Neither a ring nor a magnet seen from both sides.
     #[error("no ring of magnets fits the log, and no magnet was seen from both sides of the axis")]
     NothingFits,
@@ -151,6 +159,10 @@ const NEAR_INNER_MM: f64 = 5.0;
 /// [`FitError`], when it says nothing.
 pub fn fit_log(log: &Log) -> Result<Fit, FitError> {
     let mut detected = detect::magnets(log, 0.0, 0.0);
+    if detected.passes > detect::MOST_PASSES {
+        let (found, most) = (detected.passes, detect::MOST_PASSES);
+        return Err(FitError::TooManyPasses { found, most });
+    }
     let mut fit = fit(&detected.sightings, &log.known)?;
     // Chords are circles only for the right rail; the second round is exact to a nanometre.
     for _ in 0..2 {
