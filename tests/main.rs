@@ -24,5 +24,6 @@ mod shared;
 mod slice;
 mod text;
 mod threads;
+mod verify;
 mod volume;
 mod walls;

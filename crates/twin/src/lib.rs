@@ -9,8 +9,9 @@
 //! what is measured; [`family`] knows the surfaces of layers; [`section`] cuts the mesh, [`columns`]
 //! tells its inside, [`nearest`] how far away its surface is. The checks, one concept each, are in [`check`],
 //! what they find in [`finding`], the sums of a program in [`totals`]; [`verify`] runs it all over
-//! a program. [`picture`] draws what was replayed, so that a picture cannot lie. [`magnets`] is a
-//! machine with a sensor, for trying out a calibration.
+//! a program. [`form`] compares the part with the one that a misaligned machine would make of the same
+//! program; [`picture`] draws what was replayed, so that a picture cannot lie. [`magnets`] is a machine
+//! with a sensor, for trying out a calibration.
 //!
 //! Lengths are mm, angles radians, times seconds, temperatures degrees Celsius. Frames: *Part*
 //! turns with the bed, *Machine* does not; both as in [`machine::kinematics`].
@@ -20,6 +21,7 @@ pub mod columns;
 pub mod curve;
 pub mod family;
 pub mod finding;
+pub mod form;
 pub mod magnets;
 pub mod nearest;
 pub mod picture;

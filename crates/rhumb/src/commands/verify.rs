@@ -3,12 +3,15 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use machine::gcode::dialect::Space;
 use mesh::health::solid_from_soup;
 use mesh::stl;
+use twin::form::FormError;
 use twin::thorough::Thorough;
 
-use super::{DONE, LOOK, say, say_json, settings};
+use super::{DONE, LOOK, display_name, say, say_json, settings};
 use crate::args::{Manner, Proof, SettingsArguments, Verify};
+use crate::calibration::Calibration;
 use crate::check::{check, findings};
 use crate::failure::Failure;
 use crate::input;
@@ -21,6 +24,8 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
     let part = arguments.model.as_deref().map(part).transpose()?;
     let verdict =
         check(program.as_slice(), &job, part.as_ref(), arguments.proof == Proof::Full, |_| {})?;
+    let form = arguments.machine_error.as_deref();
+    let form = form.map(|path| form_error(&program, &job, path)).transpose()?;
     if manner.json {
         say_json(&serde_json::json!({
             "verify": {"findings": findings(&verdict)},
@@ -29,6 +34,13 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
             "filament_mm": verdict.totals.filament,
             "surface_residual_mm": verdict.totals.surface_residual,
             "notes": verdict.notes,
+            "form_error": form.map(|form| serde_json::json!({
+                "greatest_mm": form.greatest,
+                "rms_mm": form.rms,
+                "greatest_fitted_mm": form.greatest_fitted,
+                "rms_fitted_mm": form.rms_fitted,
+                "places": form.places,
+            })),
             "support": verdict.totals.thorough.as_ref().map(support),
         }))?;
     } else {
@@ -58,9 +70,36 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
         if let Some(thorough) = &totals.thorough {
             let _ = writeln!(out, "{}", laid(thorough));
         }
+        if let Some(form) = form {
+            let _ = writeln!(
+                out,
+                "on that machine places are {:.3} mm off at most, {:.3} mm rms; laid over the part \
+                 as well as can be {:.3} mm at most, {:.3} mm rms",
+                form.greatest, form.rms, form.greatest_fitted, form.rms_fitted
+            );
+        }
         say(&out)?;
     }
     Ok(if verdict.findings.is_empty() { DONE } else { LOOK })
+}
+
+/// The error of the part's form on a machine that misses the ideal one as the file says.
+fn form_error(program: &[u8], job: &Job, path: &Path) -> Result<FormError, Failure> {
+    if job.dialect.space == Space::Part {
+        return Err(Failure::new(
+            "Usage",
+            format!(
+                "--machine-error: a program in dialect {} does not say where the joints are",
+                job.dialect.name
+            ),
+        ));
+    }
+    let calibration = Calibration::read(&input::read(path)?, &display_name(path))?;
+    let mut off = job.printer.clone();
+    calibration.apply(&mut off, job.bed_map_fade)?;
+    let text = String::from_utf8_lossy(program);
+    twin::form::compare(text.lines(), &job.printer, &off, job.dialect)
+        .ok_or_else(|| Failure::new("NothingToPrint", "the program lays nothing"))
 }
 
 /// What lies below and around the beads, as data.
