@@ -79,6 +79,8 @@ pub(crate) struct Footing {
     pub(crate) resting: u32,
     /// Where another stroke of the same layer lies already.
     pub(crate) taken: u32,
+    /// Where its own stroke lies already: under the round end of the piece before.
+    pub(crate) own: u32,
     /// The empty space under it, mm³.
     pub(crate) hollow: f64,
 }
@@ -89,9 +91,10 @@ impl Footing {
         if self.covered == 0 { 1.0 } else { f64::from(self.resting) / f64::from(self.covered) }
     }
 
-    /// Returns the share that another stroke has taken.
+    /// Returns the share of what its own stroke does not cover that another has taken.
     pub(crate) fn taken_share(&self) -> f64 {
-        if self.covered == 0 { 0.0 } else { f64::from(self.taken) / f64::from(self.covered) }
+        let fresh = self.covered - self.own;
+        if fresh == 0 { 0.0 } else { f64::from(self.taken) / f64::from(fresh) }
     }
 }
 
@@ -178,7 +181,9 @@ impl Pile {
         let cell = &mut tile.cells[y * TILE + x];
         footing.covered += 1;
         if cell.layer == piece.layer {
-            footing.taken += u32::from(cell.stroke != piece.stroke);
+            let count =
+                if cell.stroke == piece.stroke { &mut footing.own } else { &mut footing.taken };
+            *count += 1;
         } else {
             (cell.under, cell.layer) = (cell.top, piece.layer);
         }
@@ -319,6 +324,8 @@ mod tests {
         assert_eq!(pile.lay(&piece(0.0, 5.0, 7, 0)).share(), 0.0);
         let again = pile.lay(&piece(0.0, 5.0, 7, 1));
         assert_eq!((again.share(), again.taken_share()), (0.0, 1.0));
+        let own = pile.lay(&piece(0.0, 5.0, 7, 1));
+        assert_eq!((own.own, own.taken_share()), (own.covered, 0.0));
     }
 
     #[test]

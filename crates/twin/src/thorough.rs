@@ -167,7 +167,10 @@ impl<'a> Watch<'a> {
         let is_inside = footing.resting < footing.covered && self.is_inside(&ends, segment.role);
         let step = Step { line: segment.line, layer: segment.layer, ends, footing, is_inside };
         self.follow.piece(&step, findings);
-        self.overlap.piece(&step, findings);
+        // What fills a gap between walls lies between and under their round sides.
+        if segment.role != Role::GapFill {
+            self.overlap.piece(&step, findings);
+        }
         if let Some(hollow) = &mut self.hollow {
             hollow.piece(&step);
         }

@@ -20,9 +20,9 @@ use crate::segment::Segment;
 /// The name of this check.
 pub const NAME: &str = "flow";
 
-/// How much more or less than announced the cross-section may be, as a share: half of what shows on
+/// How much more or less than announced the cross-section may be, as a share: less than what shows on
 /// a wall.
-pub const OFF: f64 = 0.04;
+pub const OFF: f64 = 0.03;
 
 /// The thinnest wedge, as a share of its layer. Half, less what its width is rounded by.
 pub const THINNEST: f64 = 0.45;
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn planar_beads_have_what_is_announced() {
-        assert!(found(1.0, None).is_empty() && found(1.035, None).is_empty());
+        assert!(found(1.0, None).is_empty() && found(1.025, None).is_empty());
         assert_eq!(found(1.06, None), [1.0 + OFF; 10]);
         assert_eq!(found(0.94, None), [1.0 - OFF; 10]);
     }
