@@ -2,7 +2,7 @@
 //! hollow space of `coverage`.
 //!
 //! Every move is taken apart into pieces of at most [`PIECE`]. The nozzle stands over each, and
-//! what it lays is added to the [pile](crate::pile). A line is what is laid without a move between;
+//! what it lays is added to the pile. A line is what is laid without a move between;
 //! it has a number, so that it can be told from its neighbours.
 
 use machine::kinematics::Alignment;

@@ -2,7 +2,7 @@
 //!
 //! The outline of nozzle and block from the printer's profile stands over the tip every
 //! [`crate::check::support::PIECE`] of the way, travels included, and is compared with the heights
-//! of what was laid (see [`crate::pile`]).
+//! of what was laid (see `pile`).
 //!
 //! * The flat face may press [`PRESSED`] layers deep into earlier layers: it irons what is uphill of
 //!   it. What the present layer laid is soft, and the face drags through it wherever a

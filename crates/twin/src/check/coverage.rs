@@ -1,6 +1,6 @@
 //! Is a solid print solid?
 //!
-//! Where a bead is laid over empty space (see [`crate::pile`]) and that space belongs to the part,
+//! Where a bead is laid over empty space (see `pile`) and that space belongs to the part,
 //! the space is hollow. A layer may leave [`MOST_HOLLOW`] hollow: the corners that no round bead
 //! reaches. mm³, part frame.
 

@@ -2,7 +2,7 @@
 //!
 //! Beads are looked at in pieces of at most [`PIECE`]; a piece is carried when at least
 //! [`LEAST_SHARE`] of its width and length rests on the bed or on earlier layers (see
-//! [`crate::pile`]). Pieces in a row that are not carried are a *gap*:
+//! `pile`). Pieces in a row that are not carried are a *gap*:
 //!
 //! * a gap shorter than [`SHORTEST`] is nothing;
 //! * a gap with carried ends is a bridge: any line over [`BRIDGE_ANY`], a straight one over
