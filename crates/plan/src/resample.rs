@@ -14,6 +14,8 @@
 //! is one move to the other side of the rail, and the bed does not turn at all; what follows is
 //! then laid from the far side, as far as the rail reaches.
 
+mod long_move;
+
 use machine::gcode::Dialect;
 use machine::gcode::dialect::Space;
 use machine::height_map::HeightMap;
@@ -86,21 +88,6 @@ const LEAST_PATH_MM: f64 = 1e-6;
 
 /// How far an axis may be sent beyond its end, mm: what rounding does to a position at the end.
 const REACH_SLACK_MM: f64 = 5e-4;
-
-/// Largest turn of the bed in one move for several strokes, radians: 15°. An arc and its chord, by
-/// which readers of a program measure speed, then differ by 0.3 %.
-const LONG_MOVE_TURN: f64 = std::f64::consts::FRAC_PI_6 / 2.0;
-
-/// Most strokes that become one move; 15° of the finest arc has fewer.
-const MOST_STROKES: usize = 256;
-
-/// Strokes nearer than this to what is kept clear of the axis, mm, have moves of their own: there the
-/// way round the axis is found stroke by stroke.
-const LONG_MOVE_CLEARANCE_MM: f64 = 1.0;
-
-/// How much the length of a long move may differ from that of its strokes, as a share: a line that
-/// turns back on itself is no single move, however near it stays.
-const LONG_MOVE_LENGTH: f64 = 0.01;
 
 /// Halvings after which a piece is taken as it is; 2⁻⁴⁰ of any stroke is far below a step.
 const MOST_HALVINGS: u32 = 40;
@@ -198,90 +185,6 @@ impl Resampler {
             }
         }
         Ok(all)
-    }
-
-    /// One move for as many strokes as possible, at least two, and their number: circles about the
-    /// axis and spirals are straight in joint space, however finely their strokes are cut.
-    fn long_move(&mut self, strokes: &[Stroke]) -> Option<(usize, Leg)> {
-        if self.params.dialect.space != Space::Joints || strokes[0].kind != Kind::Print {
-            return None;
-        }
-        let run = 1 + strokes[1..].iter().take_while(|stroke| stroke.continues).count();
-        let targets: Vec<Target> = strokes[..run.min(MOST_STROKES)]
-            .iter()
-            .map_while(|stroke| {
-                let at = Rotation2d(self.params.azimuth).turn(&stroke.to);
-                let over_bed = Point2::from(self.alignment.over_bed(&at.xy()));
-                let far_enough = over_bed.coords.norm() > self.clearance + LONG_MOVE_CLEARANCE_MM;
-                far_enough.then_some(Target { over_bed, z: stroke.to.z })
-            })
-            .collect();
-        // Twice as many as long as that goes well, then the exact number between.
-        let (mut good, mut bad) = (1, targets.len() + 1);
-        while good + 1 < bad {
-            let count =
-                if bad > targets.len() { (2 * good).min(targets.len()) } else { (good + bad) / 2 };
-            if self.follows(&targets[..count]) { good = count } else { bad = count }
-        }
-        if good < 2 {
-            return None;
-        }
-        let mut legs = Vec::new();
-        let target = &targets[good - 1];
-        let to = self.joints_at(target).ok()?;
-        self.push(Kind::Print, to, target, &mut legs).ok()?;
-        let leg = legs.pop()?;
-        let filament = strokes[..good].iter().map(|stroke| stroke.filament).sum();
-        Some((good, Leg { filament, speed: strokes[0].speed, ..leg }))
-    }
-
-    /// Whether one move to the last target stays within the chord tolerance of the way past all.
-    fn follows(&self, targets: &[Target]) -> bool {
-        let Some(Ok(to)) = targets.last().map(|last| self.joints_at(last)) else { return false };
-        let turn = to.turn.radians() - self.joints.turn.radians();
-        if turn.abs() > LONG_MOVE_TURN {
-            return false;
-        }
-        let from = Target { over_bed: self.over_bed, z: self.joints.z };
-        let lengths: Vec<f64> = std::iter::once(&from)
-            .chain(targets)
-            .zip(targets)
-            .map(|(a, b)| (b.over_bed - a.over_bed).norm().hypot(b.z - a.z))
-            .collect();
-        let whole: f64 = lengths.iter().sum();
-        if (self.path_length(&to) - whole).abs() > LONG_MOVE_LENGTH * whole {
-            return false;
-        }
-        let mut done = 0.0;
-        let mut before = from;
-        targets.iter().zip(&lengths).all(|(target, length)| {
-            let middle = Target {
-                over_bed: nalgebra::center(&before.over_bed, &target.over_bed),
-                z: f64::midpoint(before.z, target.z),
-            };
-            let passes = |place: &Target, share: f64| self.distance_at(&to, share, place);
-            let tolerance = self.params.chord;
-            let near = passes(&middle, (done + length / 2.0) / whole) <= tolerance
-                && passes(target, (done + length) / whole) <= tolerance;
-            done += length;
-            before = *target;
-            near
-        })
-    }
-
-    /// How far the move to `to` passes from a place that it should reach after about `share` of its
-    /// way, mm.
-    fn distance_at(&self, to: &Joints, share: f64, place: &Target) -> f64 {
-        const STEP: f64 = 1e-3;
-        let at = |share: f64| {
-            let joints = self.params.dialect.between(&self.joints, to, share);
-            let over_bed = self.over_bed_at(&joints);
-            Point3::new(over_bed.x, over_bed.y, joints.z)
-        };
-        let here = at(share);
-        let along = (at(share + STEP) - at(share - STEP)).normalize();
-        let off = Point3::new(place.over_bed.x, place.over_bed.y, place.z) - here;
-        (off - along * off.dot(&along)).norm()
     }
 
     fn legs_of(&mut self, strokes: &[Stroke], index: usize) -> Result<Vec<Leg>, Unreachable> {
@@ -702,10 +605,10 @@ mod tests {
     use machine::gcode::dialect::{CARTESIAN, POLAR};
     use std::f64::consts::PI;
 
-    const PARAMS: ResampleParams =
+    pub(super) const PARAMS: ResampleParams =
         ResampleParams { chord: 0.005, travel_chord: 0.1, dialect: POLAR, azimuth: 0.0 };
 
-    fn print(x: f64, y: f64) -> Stroke {
+    pub(super) fn print(x: f64, y: f64) -> Stroke {
         Stroke {
             kind: Kind::Print,
             to: Point3::new(x, y, 0.2),
@@ -715,7 +618,7 @@ mod tests {
         }
     }
 
-    fn travel(x: f64, y: f64) -> Stroke {
+    pub(super) fn travel(x: f64, y: f64) -> Stroke {
         Stroke { kind: Kind::Travel, filament: 0.0, ..print(x, y) }
     }
 
@@ -740,51 +643,6 @@ mod tests {
             from = leg.to;
         }
         worst
-    }
-
-    #[test]
-    fn a_line_that_turns_back_is_not_one_move() {
-        let back = Stroke { continues: true, ..print(30.2, 0.0) };
-        let strokes = [travel(30.0, 0.0), print(30.4, 0.0), back];
-        let legs = Resampler::new(&printer(), PARAMS).legs(&strokes).unwrap();
-        assert_eq!(legs[1..].iter().map(Vec::len).collect::<Vec<_>>(), [1, 1]);
-        let ahead = Stroke { continues: true, ..print(30.8, 0.0) };
-        let strokes = [travel(30.0, 0.0), print(30.4, 0.0), ahead];
-        let legs = Resampler::new(&printer(), PARAMS).legs(&strokes).unwrap();
-        assert_eq!(legs[1..].iter().map(Vec::len).collect::<Vec<_>>(), [0, 1]);
-    }
-
-    #[test]
-    fn a_circle_about_the_axis_is_a_few_long_moves_within_the_tolerance() {
-        let (radius, count) = (20.0, 400);
-        let point = |k: u32| {
-            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(count);
-            (radius * angle.cos(), radius * angle.sin())
-        };
-        let (x, y) = point(0);
-        let mut strokes = vec![travel(x, y)];
-        strokes.extend((1..=count).map(|k| {
-            let (x, y) = point(k);
-            Stroke { continues: k > 1, ..print(x, y) }
-        }));
-        let mut resampler = Resampler::new(&printer(), PARAMS);
-        let mut from = resampler.joints();
-        let groups = resampler.legs(&strokes).unwrap();
-        assert_eq!(groups.len(), strokes.len());
-        let legs: Vec<Leg> = groups[1..].iter().flatten().copied().collect();
-        assert!((24..=30).contains(&legs.len()), "{} moves", legs.len());
-        let fed: f64 = legs.iter().map(|leg| leg.filament).sum();
-        assert!((fed - 0.1 * f64::from(count)).abs() < 1e-9);
-        for (k, leg) in groups.iter().flatten().enumerate() {
-            if k >= groups[0].len() {
-                for share in [0.1, 0.3, 0.5, 0.7, 0.9] {
-                    let at = Alignment::default()
-                        .part_from_joints(&POLAR.between(&from, &leg.to, share));
-                    assert!((at.xy().coords.norm() - radius).abs() < 0.005);
-                }
-            }
-            from = leg.to;
-        }
     }
 
     #[test]
