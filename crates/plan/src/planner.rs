@@ -110,6 +110,7 @@ impl<'a> Planner<'a> {
     #[must_use]
     pub fn new(printer: &'a Printer, params: PlanParams) -> Self {
         let resampler = Resampler::new(printer, params.resample);
+        let resampler = if params.curved { resampler.on_near_side() } else { resampler };
         let printed = params.curved.then(|| Printed::nothing(printer.rail.max));
         Self {
             printer,

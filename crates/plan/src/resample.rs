@@ -147,6 +147,13 @@ impl Resampler {
         }
     }
 
+    /// Keeps the carriage on the near side of the axis. Where layers are curved, the way from one side
+    /// to the other could lead through what stands around the axis.
+    #[must_use]
+    pub(crate) fn on_near_side(self) -> Self {
+        Self { far_reach: f64::NEG_INFINITY, ..self }
+    }
+
     /// Where the joints stand.
     #[must_use]
     pub fn joints(&self) -> Joints {
