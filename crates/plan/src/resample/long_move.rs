@@ -34,15 +34,22 @@ impl Resampler {
             return None;
         }
         let run = 1 + strokes[1..].iter().take_while(|stroke| stroke.continues).count();
-        let targets: Vec<Target> = strokes[..run.min(MOST_STROKES)]
-            .iter()
-            .map_while(|stroke| {
-                let at = Rotation2d(self.params.azimuth).turn(&stroke.to);
-                let over_bed = Point2::from(self.alignment.over_bed(&at.xy()));
-                let far_enough = over_bed.coords.norm() > self.clearance + LONG_MOVE_CLEARANCE_MM;
-                far_enough.then_some(Target { over_bed, z: stroke.to.z })
-            })
-            .collect();
+        if run < 2 {
+            return None;
+        }
+        let turn = Rotation2d(self.params.azimuth);
+        let target = |stroke: &Stroke| {
+            let at = turn.turn(&stroke.to);
+            let over_bed = Point2::from(self.alignment.over_bed(&at.xy()));
+            let far_enough = over_bed.coords.norm() > self.clearance + LONG_MOVE_CLEARANCE_MM;
+            far_enough.then_some(Target { over_bed, z: stroke.to.z })
+        };
+        // Most strokes end at a corner, which needs no kinematics to be seen.
+        if !self.may_follow(&target(&strokes[0])?, &target(&strokes[1])?) {
+            return None;
+        }
+        let targets: Vec<Target> =
+            strokes[..run.min(MOST_STROKES)].iter().map_while(target).collect();
         // Twice as many as long as that goes well, then the exact number between.
         let (mut good, mut bad) = (1, targets.len() + 1);
         while good + 1 < bad {
@@ -60,6 +67,17 @@ impl Resampler {
         let leg = legs.pop()?;
         let filament = strokes[..good].iter().map(|stroke| stroke.filament).sum();
         Some((good, Leg { filament, speed: strokes[0].speed, ..leg }))
+    }
+
+    /// Whether a move past the first of two targets could end at the second: how far the first lies
+    /// from the straight line is compared with how far a move can bend, twice over.
+    fn may_follow(&self, first: &Target, second: &Target) -> bool {
+        let (to_first, along) = (first.over_bed - self.over_bed, second.over_bed - self.over_bed);
+        let length = along.norm();
+        let off = along.perp(&to_first).abs() / length;
+        let ends = [self.over_bed, first.over_bed, second.over_bed];
+        let nearest = ends.iter().map(|p| p.coords.norm()).fold(f64::INFINITY, f64::min);
+        off <= self.params.chord + length * length / (4.0 * nearest)
     }
 
     /// Whether one move to the last target stays within the chord tolerance of the way past all.
