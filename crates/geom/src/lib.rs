@@ -16,6 +16,7 @@
 pub mod bounding;
 pub mod circle;
 pub mod grid;
+mod nesting;
 pub mod offset;
 pub mod polyline;
 pub mod region;

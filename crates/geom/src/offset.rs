@@ -7,16 +7,21 @@
 //! At a corner whose moved sides drift apart the raw ring follows an arc; where they run into each
 //! other it takes their crossing, which is exact, or, where a side is too short for that, returns
 //! to the corner itself, so that the winding of the loop it leaves is negative. Differences from
-//! the source: the exact crossings (they keep the point count of smooth outlines) and arcs only
-//! where a single point would be off by more than the tolerance.
+//! the source: the exact crossings (they keep the point count of smooth outlines), arcs only where
+//! a single point would be off by more than the tolerance, and sides that bound nothing are left
+//! out beforehand ([`MovedSides`]), so that most raw rings have no loops at all.
 //!
 //! Guarantee: no point of the new border is nearer to the old one than the distance less
 //! [`ARC_TOLERANCE_MM`] and a grid step; convex corners of an inset stay sharp.
+
+mod moved_sides;
 
 use nalgebra::{Point2, Vector2};
 
 use crate::grid::{GridPoint, STEPS_PER_MM};
 use crate::region::{Fill, Region, Ring, signed_area};
+
+pub use moved_sides::{MovedSides, ShortSides};
 
 /// How far an arc's chords may cut into it, mm. Larger shows in outer walls at concave corners
 /// (their budget is 4 µm rms); smaller multiplies the points of every later step.
@@ -61,12 +66,13 @@ impl Region {
     /// Returns the inset and the area (mm²) over which its border ran into itself: zero, up to
     /// rounding, when every part of the region is at least twice `distance` thick.
     ///
-    /// That area is what the raw rings enclose with the wrong winding; it costs nothing to know.
+    /// That area is what the raw rings enclose with the wrong winding, small loops included: a
+    /// thin place with a rounded end has no more.
     #[must_use]
     pub fn inset_with_loss(&self, distance: f64) -> (Self, f64) {
-        let raw = self.raw_rings(distance, &EXACT);
-        let enclosed: f64 = raw.iter().map(|ring| signed_area(ring)).sum();
-        let inset = Self::from_grid_rings(&raw, Fill::Positive);
+        let looped = self.raw_rings(distance, &EXACT, ShortSides::Loop);
+        let enclosed: f64 = looped.iter().map(|ring| signed_area(ring)).sum();
+        let inset = self.shifted(distance, &EXACT);
         let lost = inset.area() - enclosed;
         (inset, lost)
     }
@@ -76,12 +82,14 @@ impl Region {
         if self.is_empty() || shift == 0.0 {
             return self.clone();
         }
-        Self::from_grid_rings(&self.raw_rings(shift, arcs), Fill::Positive)
+        let raw = self.raw_rings(shift, arcs, ShortSides::LeftOut);
+        Self::from_grid_rings(&raw, Fill::Positive)
     }
 
-    fn raw_rings(&self, shift: f64, arcs: &Arcs) -> Vec<Ring> {
+    fn raw_rings(&self, shift: f64, arcs: &Arcs, short_sides: ShortSides) -> Vec<Ring> {
         debug_assert!(shift.is_finite());
-        self.rings().map(|ring| raw_ring(ring, shift * STEPS_PER_MM, arcs)).collect()
+        let shift = shift * STEPS_PER_MM;
+        self.rings().map(|ring| raw_ring(ring, shift, arcs, short_sides)).collect()
     }
 }
 
@@ -91,6 +99,21 @@ struct Arcs {
     tolerance: f64,
     /// Corners whose sides cross within this many distances are not rounded at all; 0 rounds all.
     longest_miter: f64,
+}
+
+impl Arcs {
+    /// How far chords may cut into arcs about a corner, in grid steps like `shift`.
+    fn tolerance(&self, shift: f64) -> f64 {
+        (self.tolerance * STEPS_PER_MM).min(shift.abs() / 2.0)
+    }
+
+    /// Whether an outer corner ends at the crossing of its moved sides: near enough to the arc, or
+    /// wanted sharp. The crossing lies |shift|/cos(turn/2) from the corner.
+    fn leave_sharp(&self, corner: &Corner, shift: f64) -> bool {
+        let cos_half = f64::midpoint(1.0, corner.turn.0).max(0.0).sqrt();
+        shift.abs() * (1.0 - cos_half) <= self.tolerance(shift) * cos_half
+            || cos_half * self.longest_miter >= 1.0
+    }
 }
 
 const EXACT: Arcs = Arcs { tolerance: ARC_TOLERANCE_MM, longest_miter: 0.0 };
@@ -121,10 +144,10 @@ impl Corner {
         self.turn.1 * shift > 0.0
     }
 
-    /// What each side loses when both end at their crossing.
+    /// What each side loses when both end at their crossing; negative where it grows.
     fn consumed(&self, shift: f64) -> f64 {
         let (cos, sin) = self.turn;
-        if self.is_inner(shift) { (shift * sin / (1.0 + cos)).abs() } else { 0.0 }
+        shift * sin / (1.0 + cos)
     }
 
     /// The crossing of the two moved sides.
@@ -134,7 +157,7 @@ impl Corner {
 }
 
 /// The raw ring of one ring; `shift` in grid steps.
-fn raw_ring(ring: &[GridPoint], shift: f64, arcs: &Arcs) -> Ring {
+fn raw_ring(ring: &[GridPoint], shift: f64, arcs: &Arcs, short_sides: ShortSides) -> Ring {
     let count = ring.len();
     let float = |p: GridPoint| Point2::new(f64::from(p.x), f64::from(p.y));
     let sides: Vec<Side> = (0..count)
@@ -158,26 +181,53 @@ fn raw_ring(ring: &[GridPoint], shift: f64, arcs: &Arcs) -> Ring {
             }
         })
         .collect();
-    let fits: Vec<bool> = (0..count)
-        .map(|i| {
-            let lost = corners[i].consumed(shift) + corners[(i + 1) % count].consumed(shift);
-            lost <= sides[i].length
+    let lengths: Vec<f64> = sides.iter().map(|side| side.length).collect();
+    let lost: Vec<Option<[f64; 2]>> = corners
+        .iter()
+        .map(|corner| {
+            let meet = corner.is_inner(shift) || arcs.leave_sharp(corner, shift);
+            meet.then(|| [corner.consumed(shift); 2])
         })
         .collect();
+    // Where the image of a side begins, or would if it lost nothing.
+    let start = |side: usize| corners[side].at + corners[side].normals[1] * shift;
+    let mut moved = MovedSides::new(&lengths, &lost);
+    if short_sides == ShortSides::LeftOut {
+        moved.leave_out_short(|one, other| {
+            let (d, e) = (sides[one].direction, sides[other].direction);
+            let sine = d.perp(&e);
+            let between = start(other) - start(one);
+            (sine * shift.signum() >= LEAST_SINE)
+                .then(|| [between.perp(&e) / sine, between.perp(&d) / sine])
+        });
+    }
     let mut raw = Vec::with_capacity(count + count / 4);
-    for (i, corner) in corners.iter().enumerate() {
-        let both_fit = fits[(i + count - 1) % count] && fits[i];
-        join(corner, shift, arcs, both_fit, &mut raw);
+    for side in moved.kept() {
+        let both_fit = moved.fit_around(side);
+        if both_fit && moved.meets_across(side) {
+            raw.push(rounded(start(side) + sides[side].direction * moved.from(side)));
+            continue;
+        }
+        for corner in moved.corners(side) {
+            join(&corners[corner], shift, arcs, both_fit, &mut raw);
+        }
     }
     raw
 }
 
+/// Sides that turn by a smaller sine (3°) are not made to meet across what lies between: nearly
+/// parallel, they would meet far away, and nearly opposite, they are the flanks of a thin place,
+/// whose end is not to be skipped.
+pub const LEAST_SINE: f64 = 0.05;
+
+fn rounded(p: Point2<f64>) -> GridPoint {
+    // The sum of a grid coordinate and an offset, both far below 2^31.
+    GridPoint::new(p.x.round() as i32, p.y.round() as i32)
+}
+
 /// Appends the raw ring's points at one corner.
 fn join(corner: &Corner, shift: f64, arcs: &Arcs, sides_fit: bool, raw: &mut Ring) {
-    let mut push = |p: Point2<f64>| {
-        // The sum of a grid coordinate and an offset, both far below 2^31.
-        raw.push(GridPoint::new(p.x.round() as i32, p.y.round() as i32));
-    };
+    let mut push = |p: Point2<f64>| raw.push(rounded(p));
     let ends = corner.normals.map(|normal| corner.at + normal * shift);
     if corner.is_inner(shift) {
         if sides_fit {
@@ -189,18 +239,13 @@ fn join(corner: &Corner, shift: f64, arcs: &Arcs, sides_fit: bool, raw: &mut Rin
         }
         return;
     }
-    let (cos, sin) = corner.turn;
-    let radius = shift.abs();
-    let tolerance = (arcs.tolerance * STEPS_PER_MM).min(radius / 2.0);
-    // The crossing lies radius/cos(turn/2) from the corner.
-    let cos_half = ((1.0 + cos) / 2.0).max(0.0).sqrt();
-    let is_near_arc = radius * (1.0 - cos_half) <= tolerance * cos_half;
-    if is_near_arc || cos_half * arcs.longest_miter >= 1.0 {
+    if arcs.leave_sharp(corner, shift) {
         push(corner.crossing(shift));
         return;
     }
+    let (cos, sin) = corner.turn;
     let turn = sin.atan2(cos);
-    let largest_step = 2.0 * (1.0 - tolerance / radius).acos();
+    let largest_step = 2.0 * (1.0 - arcs.tolerance(shift) / shift.abs()).acos();
     let pieces = (turn.abs() / largest_step).ceil().max(1.0);
     push(ends[0]);
     let (step_sin, step_cos) = (turn / pieces).sin_cos();

@@ -14,6 +14,7 @@ use i_overlay::core::overlay_rule::OverlayRule;
 use nalgebra::Point2;
 
 use crate::grid::{GridPoint, STEPS_PER_MM, mm, snap};
+use crate::nesting::{self, Side};
 use crate::simplify::simplify_ring;
 
 /// One closed ring; the last point is joined to the first.
@@ -78,6 +79,16 @@ impl Region {
     /// Like [`from_rings`](Self::from_rings), for rings already on the grid.
     #[must_use]
     pub fn from_grid_rings(rings: &[Ring], fill: Fill) -> Self {
+        let all = rings.iter().map(|ring| (ring.as_slice(), Side::Subject));
+        let nested = nesting::resolved(all, |windings| match fill {
+            Fill::NonZero => windings.subject != 0,
+            Fill::Positive => windings.subject > 0,
+        });
+        nested.map_or_else(|| Self::swept(rings, fill), |islands| Self { islands })
+    }
+
+    /// The overlay engine's answer.
+    fn swept(rings: &[Ring], fill: Fill) -> Self {
         let mut overlay = Overlay::new(rings.iter().map(Vec::len).sum());
         for ring in rings {
             overlay.add_contour(ring, ShapeType::Subject);
@@ -328,6 +339,22 @@ impl Region {
     }
 
     fn combined(&self, other: &Self, rule: OverlayRule) -> Self {
+        let subject = self.rings().map(|ring| (ring.as_slice(), Side::Subject));
+        let clip = other.rings().map(|ring| (ring.as_slice(), Side::Clip));
+        let both = subject.chain(clip);
+        let nested = nesting::resolved(both, |windings| {
+            let (subject, clip) = (windings.subject != 0, windings.clip != 0);
+            match rule {
+                OverlayRule::Union => subject || clip,
+                OverlayRule::Intersect => subject && clip,
+                _ => subject && !clip,
+            }
+        });
+        nested.map_or_else(|| self.swept_with(other, rule), |islands| Self { islands })
+    }
+
+    /// The overlay engine's answer.
+    fn swept_with(&self, other: &Self, rule: OverlayRule) -> Self {
         let mut overlay = Overlay::from_subj_and_clip(&self.islands, &other.islands);
         Self { islands: overlay.overlay(rule, FillRule::NonZero) }
     }
@@ -410,6 +437,53 @@ mod tests {
         near(nested.perimeter(), 40.0 + 32.0 + 8.0);
         assert!(nested.contains(&Point2::new(5.0, 5.0)));
         assert!(!nested.contains(&Point2::new(2.0, 2.0)));
+    }
+
+    /// A wavy ring about (x, y), grid steps.
+    fn wavy(x: i32, y: i32, radius: f64, corners: u32, seed: f64) -> Ring {
+        (0..corners)
+            .map(|k| {
+                let angle = std::f64::consts::TAU * f64::from(k) / f64::from(corners) + seed;
+                let radius = radius * (1.0 + 0.1 * (angle * 5.0 + seed).sin());
+                GridPoint::new(x + (radius * angle.cos()) as i32, y + (radius * angle.sin()) as i32)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn rings_that_do_not_cross_give_what_the_sweep_gives() {
+        for seed in 0..60 {
+            let seed = f64::from(seed) * 0.7;
+            let mut rings = vec![
+                wavy(0, 0, 100_000.0, 40, seed),
+                wavy(20_000, 0, 30_000.0, 20, seed + 1.0),
+                wavy(-50_000, 20_000, 9_000.0, 20, seed + 2.0),
+                wavy(20_000, 1_000, 10_000.0, 9, seed + 3.0),
+                wavy(300_000, 1_000, 90_000.0, 30, seed + 4.0),
+                wavy(-300_000, 1_000, 90_000.0, 30, seed + 4.0),
+            ];
+            rings[1].reverse();
+            rings[2].reverse();
+            // A point twice, and one in the middle of a straight side.
+            let twice = rings[0][3];
+            rings[0].insert(3, twice);
+            let (a, b) = (rings[4][0], rings[4][1]);
+            let half = ((b.x - a.x) / 2, (b.y - a.y) / 2);
+            rings[4][1] = GridPoint::new(a.x + 2 * half.0, a.y + 2 * half.1);
+            rings[4].insert(1, GridPoint::new(a.x + half.0, a.y + half.1));
+            for fill in [Fill::NonZero, Fill::Positive] {
+                let region = Region::from_grid_rings(&rings, fill);
+                assert_eq!(region, Region::swept(&rings, fill));
+                assert_eq!(region.islands().len(), 4);
+            }
+            let region = Region::from_grid_rings(&rings, Fill::Positive);
+            let inner = region.inset(0.02);
+            for other in [&inner, &Region::from_grid_rings(&rings[3..4], Fill::Positive)] {
+                for rule in [OverlayRule::Union, OverlayRule::Intersect, OverlayRule::Difference] {
+                    assert_eq!(region.combined(other, rule), region.swept_with(other, rule));
+                }
+            }
+        }
     }
 
     #[test]

@@ -154,9 +154,14 @@ impl Alignment {
     /// Returns where in the part the nozzle stands.
     #[must_use]
     pub fn part_from_joints(&self, joints: &Joints) -> Point3<f64> {
-        let over_bed = Rotation2::new(self.bed.azimuth(joints.turn)) * self.nozzle(joints);
-        let part = self.part_from_bed(&over_bed);
+        let part = self.part_from_bed(&self.over_bed_from_joints(joints));
         Point3::new(part.x, part.y, joints.z)
+    }
+
+    /// Returns the point of the bed, seen from the axis, over which the nozzle stands.
+    #[must_use]
+    pub fn over_bed_from_joints(&self, joints: &Joints) -> Vector2<f64> {
+        Rotation2::new(self.bed.azimuth(joints.turn)) * self.nozzle(joints)
     }
 
     /// Returns the joints that bring the nozzle over `part`, with the bed turned as little as
@@ -210,14 +215,19 @@ impl Alignment {
     /// Returns the point of the bed, seen from the axis, on which a point of the part lies.
     #[must_use]
     pub fn over_bed(&self, part: &Point2<f64>) -> Vector2<f64> {
-        self.plate_offset + Rotation2::new(self.plate_angle) * part.coords
+        self.plate_offset + turned(part.coords, self.plate_angle)
     }
 
     /// Returns the point of the part that lies on a point of the bed, seen from the axis.
     #[must_use]
     pub fn part_from_bed(&self, over_bed: &Vector2<f64>) -> Point2<f64> {
-        Point2::from(Rotation2::new(-self.plate_angle) * (over_bed - self.plate_offset))
+        Point2::from(turned(over_bed - self.plate_offset, -self.plate_angle))
     }
+}
+
+/// Turns a vector; most plates are straight, and a turn by nothing needs no sine.
+fn turned(vector: Vector2<f64>, angle: f64) -> Vector2<f64> {
+    if angle == 0.0 { vector } else { Rotation2::new(angle) * vector }
 }
 
 #[cfg(test)]

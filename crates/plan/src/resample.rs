@@ -96,6 +96,8 @@ const MOST_HALVINGS: u32 = 40;
 #[derive(Debug, Clone)]
 pub struct Resampler {
     alignment: Alignment,
+    /// From the slicer's frame to the part's.
+    azimuth: Rotation2<f64>,
     params: ResampleParams,
     clearance: f64,
     rail: Axis,
@@ -133,6 +135,7 @@ impl Resampler {
         let reaches_far_side = params.dialect.reaches_far_side();
         Self {
             alignment: printer.alignment,
+            azimuth: Rotation2::new(params.azimuth),
             params,
             clearance: clearance / chords_keep_clear,
             rail: printer.rail,
@@ -163,7 +166,7 @@ impl Resampler {
     /// Returns where the nozzle stands, in the slicer's frame.
     #[must_use]
     pub fn at(&self) -> Point3<f64> {
-        Rotation2d(-self.params.azimuth).turn(&self.at_part)
+        turned(&self.azimuth.inverse(), &self.at_part)
     }
 
     /// Returns the legs of consecutive strokes.
@@ -196,7 +199,7 @@ impl Resampler {
 
     fn legs_of(&mut self, strokes: &[Stroke], index: usize) -> Result<Vec<Leg>, Unreachable> {
         let stroke = &strokes[index];
-        let at = Rotation2d(self.params.azimuth).turn(&stroke.to);
+        let at = turned(&self.azimuth, &stroke.to);
         let target =
             Target { over_bed: Point2::from(self.alignment.over_bed(&at.xy())), z: stroke.to.z };
         let mut legs = Vec::new();
@@ -271,7 +274,7 @@ impl Resampler {
         let run = strokes[index + 1..].iter().take_while(|s| s.kind != Kind::Travel);
         let azimuth = |p: Point2<f64>| self.alignment.bed.turn(p.y.atan2(p.x));
         let places = run.map(|stroke| {
-            let at = Rotation2d(self.params.azimuth).turn(&stroke.to);
+            let at = turned(&self.azimuth, &stroke.to);
             azimuth(Point2::from(self.alignment.over_bed(&at.xy())))
         });
         let run = extent(std::iter::once(azimuth(self.over_bed)).chain(places));
@@ -520,7 +523,7 @@ impl Resampler {
     }
 
     fn over_bed_at(&self, joints: &Joints) -> Point2<f64> {
-        Point2::from(self.alignment.over_bed(&self.alignment.part_from_joints(joints).xy()))
+        Point2::from(self.alignment.over_bed_from_joints(joints))
     }
 
     /// Whether a stroke runs through the axis, and the rail reaches what follows from the other
@@ -566,20 +569,16 @@ impl Resampler {
             !crosses
         });
         std::iter::once(&strokes[index]).chain(run).all(|stroke| {
-            let at = Rotation2d(self.params.azimuth).turn(&stroke.to);
+            let at = turned(&self.azimuth, &stroke.to);
             self.alignment.over_bed(&at.xy()).norm() <= self.far_reach
         })
     }
 }
 
-/// A turn about the z axis.
-struct Rotation2d(f64);
-
-impl Rotation2d {
-    fn turn(&self, p: &Point3<f64>) -> Point3<f64> {
-        let xy = Rotation2::new(self.0) * p.xy();
-        Point3::new(xy.x, xy.y, p.z)
-    }
+/// Turns a point about the z axis.
+fn turned(by: &Rotation2<f64>, p: &Point3<f64>) -> Point3<f64> {
+    let xy = by * p.xy();
+    Point3::new(xy.x, xy.y, p.z)
 }
 
 fn way_lengths(way: &[Piece], from: Point2<f64>, clearance: f64) -> Vec<f64> {

@@ -8,7 +8,7 @@ use machine::gcode::dialect::Space;
 use machine::program::Joints;
 use nalgebra::{Point2, Point3};
 
-use super::{Leg, Resampler, Rotation2d, Target};
+use super::{Leg, Resampler, Target, turned};
 use crate::route::{Kind, Stroke};
 
 /// Largest turn of the bed in one move for several strokes, radians: 15°. An arc and its chord, by
@@ -37,9 +37,8 @@ impl Resampler {
         if run < 2 {
             return None;
         }
-        let turn = Rotation2d(self.params.azimuth);
         let target = |stroke: &Stroke| {
-            let at = turn.turn(&stroke.to);
+            let at = turned(&self.azimuth, &stroke.to);
             let over_bed = Point2::from(self.alignment.over_bed(&at.xy()));
             let far_enough = over_bed.coords.norm() > self.clearance + LONG_MOVE_CLEARANCE_MM;
             far_enough.then_some(Target { over_bed, z: stroke.to.z })

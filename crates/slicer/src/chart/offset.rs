@@ -13,7 +13,9 @@
 //! On a plane all of this is [`geom::offset`] itself, unchanged.
 
 use geom::grid::{GridPoint, mm, snap};
-use geom::offset::{ARC_TOLERANCE_MM, LONGEST_MITER, OPENING_TOLERANCE_MM};
+use geom::offset::{
+    ARC_TOLERANCE_MM, LEAST_SINE, LONGEST_MITER, MovedSides, OPENING_TOLERANCE_MM, ShortSides,
+};
 use geom::polyline::{distance_to_segment, share_nearest};
 use geom::region::{Fill, Region, Ring, signed_area};
 use nalgebra::{Point2, Vector2};
@@ -68,9 +70,9 @@ impl Chart {
         if self.is_flat() {
             return region.inset_with_loss(distance);
         }
-        let raw = self.raw_rings(region, distance, &EXACT);
-        let enclosed: f64 = raw.iter().map(|ring| signed_area(ring)).sum();
-        let inset = Region::from_grid_rings(&raw, Fill::Positive);
+        let looped = self.raw_rings(region, distance, &EXACT, ShortSides::Loop);
+        let enclosed: f64 = looped.iter().map(|ring| signed_area(ring)).sum();
+        let inset = self.shifted(region, distance, &EXACT);
         let lost = inset.area() - enclosed;
         (inset, lost)
     }
@@ -80,12 +82,19 @@ impl Chart {
         if region.is_empty() || shift == 0.0 {
             return region.clone();
         }
-        Region::from_grid_rings(&self.raw_rings(region, shift, curves), Fill::Positive)
+        let raw = self.raw_rings(region, shift, curves, ShortSides::LeftOut);
+        Region::from_grid_rings(&raw, Fill::Positive)
     }
 
-    fn raw_rings(&self, region: &Region, shift: f64, curves: &Curves) -> Vec<Ring> {
+    fn raw_rings(
+        &self,
+        region: &Region,
+        shift: f64,
+        curves: &Curves,
+        short_sides: ShortSides,
+    ) -> Vec<Ring> {
         debug_assert!(shift.is_finite());
-        region.rings().map(|ring| raw_ring(self, ring, shift, curves)).collect()
+        region.rings().map(|ring| raw_ring(self, ring, shift, curves, short_sides)).collect()
     }
 
     /// How much the image of a side of 1 mm, moved by 1 mm, may bend away from a chord, mm, at
@@ -143,6 +152,12 @@ struct Side {
     length: f64,
 }
 
+impl Side {
+    fn at(&self, t: f64) -> Point2<f64> {
+        self.from + self.direction * t
+    }
+}
+
 /// What a raw ring does at a corner.
 struct Corner {
     /// The points, in order; none twice.
@@ -161,7 +176,13 @@ struct Mover<'a> {
 }
 
 /// The raw ring of one ring; `shift` in mm.
-fn raw_ring(chart: &Chart, ring: &[GridPoint], shift: f64, curves: &Curves) -> Ring {
+fn raw_ring(
+    chart: &Chart,
+    ring: &[GridPoint],
+    shift: f64,
+    curves: &Curves,
+    short_sides: ShortSides,
+) -> Ring {
     let mover = Mover { chart, shift, curves };
     let count = ring.len();
     let sides: Vec<Side> = (0..count)
@@ -174,22 +195,39 @@ fn raw_ring(chart: &Chart, ring: &[GridPoint], shift: f64, curves: &Curves) -> R
         .collect();
     let before = |i: usize| &sides[(i + count - 1) % count];
     let turns: Vec<Turn> = (0..count).map(|i| mover.turn(before(i), &sides[i])).collect();
-    let fits: Vec<bool> = (0..count)
-        .map(|i| turns[i].consumed[1] + turns[(i + 1) % count].consumed[0] <= sides[i].length)
-        .collect();
-    let corners: Vec<Corner> = (0..count)
-        .map(|i| {
-            let both_fit = fits[(i + count - 1) % count] && fits[i];
-            mover.corner(before(i), &sides[i], &turns[i], both_fit)
+    let lengths: Vec<f64> = sides.iter().map(|side| side.length).collect();
+    let lost: Vec<Option<[f64; 2]>> =
+        turns.iter().map(|turn| mover.meet(turn).then_some(turn.consumed)).collect();
+    let mut moved = MovedSides::new(&lengths, &lost);
+    if short_sides == ShortSides::LeftOut {
+        moved.leave_out_short(|one, other| mover.crossing_of(&sides[one], &sides[other]));
+    }
+    let places: Vec<(usize, Vec<Corner>)> = moved
+        .kept()
+        .map(|side| {
+            let both_fit = moved.fit_around(side);
+            if both_fit && moved.meets_across(side) {
+                let before = moved.before(side);
+                let at = sides[side].at(moved.from(side));
+                let corner = Corner {
+                    points: vec![mover.moved(&at, &sides[side])],
+                    before: sides[before].length - moved.to(before),
+                    after: moved.from(side),
+                };
+                return (side, vec![corner]);
+            }
+            let corner = |i: usize| mover.corner(before(i), &sides[i], &turns[i], both_fit);
+            (side, moved.corners(side).map(corner).collect())
         })
         .collect();
     let mut raw = Ring::with_capacity(count + count / 4);
-    for (i, corner) in corners.iter().enumerate() {
-        raw.extend(corner.points.iter().map(snap));
-        let next = &corners[(i + 1) % count];
-        let (Some(from), Some(to)) = (corner.points.last(), next.points.first()) else { continue };
-        let range = (corner.after, sides[i].length - next.before);
-        mover.along(&sides[i], range, (from, to), &mut raw);
+    for (k, (side, corners)) in places.iter().enumerate() {
+        raw.extend(corners.iter().flat_map(|corner| &corner.points).map(snap));
+        let (_, next) = &places[(k + 1) % places.len()];
+        let (Some(here), Some(next)) = (corners.last(), next.first()) else { continue };
+        let (Some(from), Some(to)) = (here.points.last(), next.points.first()) else { continue };
+        let range = (here.after, sides[*side].length - next.before);
+        mover.along(&sides[*side], range, (from, to), &mut raw);
     }
     raw
 }
@@ -201,7 +239,7 @@ struct Turn {
     normals: [Vector2<f64>; 2],
     cos: f64,
     sin: f64,
-    /// What each side loses when both end at their crossing, chart mm.
+    /// What each side loses when both end at their crossing, chart mm; negative where it grows.
     consumed: [f64; 2],
 }
 
@@ -212,10 +250,20 @@ impl Mover<'_> {
         let (b_speed, a_speed) = (b.norm(), a.norm());
         let (b, a) = (b / b_speed, a / a_speed);
         let (cos, sin) = (b.dot(&a), b.perp(&a));
-        let lost =
-            if sin * self.shift > 0.0 { (self.shift * sin / (1.0 + cos)).abs() } else { 0.0 };
+        let lost = self.shift * sin / (1.0 + cos);
         let normals = [b, a].map(|t| Vector2::new(-t.y, t.x));
         Turn { at, normals, cos, sin, consumed: [lost / b_speed, lost / a_speed] }
+    }
+
+    /// Whether the sides at a corner end at their crossing: they run into each other, or it is near
+    /// enough to the arc, or wanted sharp. It lies |shift|/cos(turn/2) from the corner.
+    fn meet(&self, turn: &Turn) -> bool {
+        let radius = self.shift.abs();
+        let tolerance = self.curves.tolerance.min(radius / 2.0);
+        let cos_half = f64::midpoint(1.0, turn.cos).max(0.0).sqrt();
+        turn.sin * self.shift > 0.0
+            || radius * (1.0 - cos_half) <= tolerance * cos_half
+            || cos_half * self.curves.longest_miter >= 1.0
     }
 
     fn corner(&self, before: &Side, after: &Side, turn: &Turn, sides_fit: bool) -> Corner {
@@ -228,16 +276,13 @@ impl Mover<'_> {
             let [end, begin] = ends();
             return apart(vec![end, turn.at, begin]);
         }
-        let radius = self.shift.abs();
-        let tolerance = self.curves.tolerance.min(radius / 2.0);
-        // The crossing lies radius/cos(turn/2) from the corner.
-        let cos_half = ((1.0 + turn.cos) / 2.0).max(0.0).sqrt();
-        let is_near_arc = radius * (1.0 - cos_half) <= tolerance * cos_half;
-        if (is_near_arc || cos_half * self.curves.longest_miter >= 1.0)
+        if self.meet(turn)
             && let Some(corner) = self.crossing(before, after, turn)
         {
             return corner;
         }
+        let radius = self.shift.abs();
+        let tolerance = self.curves.tolerance.min(radius / 2.0);
         let angle = turn.sin.atan2(turn.cos);
         let largest_step = 2.0 * (1.0 - tolerance / radius).acos();
         let pieces = (angle.abs() / largest_step).ceil().max(1.0);
@@ -267,21 +312,41 @@ impl Mover<'_> {
         if cross == 0.0 {
             return None;
         }
-        let lost = half * turn.sin;
-        let [b, a] = [before, after]
-            .map(|side| lost / self.chart.in_metric(&turn.at, &side.direction).norm());
-        let (mut b, mut a) = (b, a);
+        let guess = [before.length - turn.consumed[0], turn.consumed[1]];
+        let ([to, from], at) = self.newton(before, after, guess)?;
+        Some(Corner { points: vec![at], before: before.length - to, after: from })
+    }
+
+    /// Where the images of two sides that are not neighbours run into each other, as lengths on
+    /// either side.
+    fn crossing_of(&self, one: &Side, other: &Side) -> Option<[f64; 2]> {
+        let sine = one.direction.perp(&other.direction) * self.shift.signum();
+        if sine < LEAST_SINE {
+            return None;
+        }
+        self.newton(one, other, [one.length, 0.0]).map(|(lengths, _)| lengths)
+    }
+
+    /// The crossing of the images of two sides and its places on them, from a guess of these;
+    /// `None` when it is not nearby.
+    fn newton(
+        &self,
+        one: &Side,
+        other: &Side,
+        [mut to, mut from]: [f64; 2],
+    ) -> Option<([f64; 2], Point2<f64>)> {
+        let cross = one.direction.perp(&other.direction);
         for _ in 0..NEWTON_STEPS {
-            let end = self.moved(&(before.from + before.direction * (before.length - b)), before);
-            let begin = self.moved(&(after.from + after.direction * a), after);
+            let end = self.moved(&one.at(to), one);
+            let begin = self.moved(&other.at(from), other);
             let gap = end - begin;
             if gap.norm() <= CROSSING_MM {
-                return Some(Corner { points: vec![end], before: b, after: a });
+                return Some(([to, from], end));
             }
             // The images run nearly along the sides themselves.
-            b += gap.perp(&after.direction) / cross;
-            a += before.direction.perp(&gap) / cross;
-            if b.abs().max(a.abs()) > 2.0 * LONGEST_MITER * self.shift.abs() {
+            to -= gap.perp(&other.direction) / cross;
+            from += one.direction.perp(&gap) / cross;
+            if (one.length - to).abs().max(from.abs()) > 2.0 * LONGEST_MITER * self.shift.abs() {
                 return None;
             }
         }
@@ -297,9 +362,8 @@ impl Mover<'_> {
         ends: (&Point2<f64>, &Point2<f64>),
         raw: &mut Ring,
     ) {
-        let at = |t: f64| side.from + side.direction * t;
-        let foot = share_nearest(&at(from), &at(to), &Point2::origin());
-        let nearest = at(from + (to - from) * foot).coords.norm();
+        let foot = share_nearest(&side.at(from), &side.at(to), &Point2::origin());
+        let nearest = side.at(from + (to - from) * foot).coords.norm();
         let bend = self.chart.bending(nearest) * (to - from).powi(2) * self.shift.abs();
         if to - from <= SHORTEST_PIECE_MM || bend <= self.curves.tolerance {
             return;
@@ -307,7 +371,7 @@ impl Mover<'_> {
         // The image bends most where the side is nearest to the axis.
         let foot = if (0.05..0.95).contains(&foot) { foot } else { 0.5 };
         let middle = from + (to - from) * foot;
-        let image = self.moved(&at(middle), side);
+        let image = self.moved(&side.at(middle), side);
         if distance_to_segment(ends.0, ends.1, &image) <= self.curves.tolerance / 2.0 {
             return;
         }
