@@ -1,6 +1,6 @@
 //! The finished program, read again and proved on a model of the machine.
 
-use std::io::BufRead;
+use std::io::{BufRead, ErrorKind};
 
 use mesh::mesh::Mesh;
 use twin::finding::{Finding, Severity};
@@ -18,7 +18,7 @@ use crate::settings::Job;
 ///
 /// `Unreadable`, when the program cannot be read to its end.
 pub fn check(
-    mut program: impl BufRead,
+    program: impl BufRead,
     job: &Job,
     part: Option<&Mesh>,
     thorough: bool,
@@ -32,24 +32,58 @@ pub fn check(
         solid: job.paths.skins.all_solid,
         thorough,
     });
-    let mut line = Vec::new();
-    loop {
-        line.clear();
-        // A line without end is a line all the same; more than a megabyte of it is no program.
-        let count = std::io::Read::take(&mut program, LONGEST_LINE)
-            .read_until(b'\n', &mut line)
-            .map_err(|error| Failure::new("Unreadable", format!("program: {error}")))?;
-        if count == 0 {
-            return Ok(verifier.finish());
-        }
-        let text = line.strip_suffix(b"\n").unwrap_or(&line);
+    each_line(program, |text| {
         if let Some(segment) = verifier.line_bytes(text) {
             each(&segment);
         }
-    }
+    })?;
+    Ok(verifier.finish())
 }
 
-const LONGEST_LINE: u64 = 1 << 20;
+/// Reads a program line by line, without their ends.
+///
+/// # Errors
+///
+/// `Unreadable`, when the program cannot be read to its end.
+pub fn each_line(mut program: impl BufRead, mut each: impl FnMut(&[u8])) -> Result<(), Failure> {
+    // What was read of a line that goes on beyond the buffer.
+    let mut begun = Vec::new();
+    loop {
+        let buffer = match program.fill_buf() {
+            Ok(buffer) => buffer,
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(error) => return Err(Failure::new("Unreadable", format!("program: {error}"))),
+        };
+        let count = buffer.len();
+        if count == 0 {
+            break;
+        }
+        let mut lines = buffer.split(|&byte| byte == b'\n');
+        let last = lines.next_back().unwrap_or_default();
+        for text in lines {
+            if begun.is_empty() {
+                each(text);
+            } else {
+                begun.extend_from_slice(text);
+                each(&begun);
+                begun.clear();
+            }
+        }
+        begun.extend_from_slice(last);
+        if begun.len() >= LONGEST_LINE {
+            each(&begun);
+            begun.clear();
+        }
+        program.consume(count);
+    }
+    if !begun.is_empty() {
+        each(&begun);
+    }
+    Ok(())
+}
+
+/// A line without end is a line all the same; more than this of it, in bytes, is no program.
+const LONGEST_LINE: usize = 1 << 20;
 
 /// Returns the failure that refuses a program with errors; `None` for one that may be printed.
 #[must_use]
@@ -94,4 +128,22 @@ pub fn findings(verdict: &Verdict) -> Vec<report::Finding> {
             message: finding.message.clone(),
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_the_same_for_any_buffer() {
+        for text in ["", "\n", "a", "a\nbc\n\ndef", "a\nbc\n\ndef\n"] {
+            for size in 1..8 {
+                let mut lines = Vec::new();
+                let reader = std::io::BufReader::with_capacity(size, text.as_bytes());
+                each_line(reader, |line| lines.push(String::from_utf8_lossy(line).into_owned()))
+                    .unwrap();
+                assert_eq!(lines, text.lines().collect::<Vec<_>>(), "{text:?} {size}");
+            }
+        }
+    }
 }

@@ -144,12 +144,23 @@ impl Replay {
 
     /// Follows the next line, taken apart before by [`read`].
     pub fn follow(&mut self, line: &Line<'_>) -> Event {
-        self.line += 1;
         match (&line.command, line.comment) {
-            (Some(command), _) => self.command(command),
-            (None, Some(comment)) => self.comment(comment),
-            (None, None) => Event::Nothing,
+            (Some(command), _) => self.follow_command(command),
+            (None, Some(comment)) => {
+                self.line += 1;
+                self.comment(comment)
+            }
+            (None, None) => {
+                self.line += 1;
+                Event::Nothing
+            }
         }
+    }
+
+    /// Follows the next line, which is this command.
+    pub(crate) fn follow_command(&mut self, command: &Command<'_>) -> Event {
+        self.line += 1;
+        self.command(command)
     }
 
     /// Counts a line that could not be read.
@@ -233,7 +244,9 @@ impl Replay {
         };
         let joints = Joints { turn: self.bed.drive(told.turn), ..told };
         let mut part = self.alignment.part_from_joints(&joints);
-        part.z = self.bed_map.part_z(&self.alignment.over_bed(&part.xy()), z);
+        if !self.bed_map.is_flat() {
+            part.z = self.bed_map.part_z(&self.alignment.over_bed(&part.xy()), z);
+        }
         Stand { plane, z, drive: told.turn, joints: Some(joints), part }
     }
 
@@ -244,8 +257,6 @@ impl Replay {
             Some([from, to]) => Curve::between_joints(from, to, &self.alignment),
             None => Curve::between_points(&from.part, &to.part, &self.alignment),
         };
-        let halfway = self.alignment.part_from_bed(&curve.over_bed(0.5));
-        let middle = Point3::new(halfway.x, halfway.y, f64::midpoint(from.part.z, to.part.z));
         let path = curve.length();
         let distance = if path > 0.0 { path } else { filament.abs() };
         let duration = self.duration(from, path, filament);
@@ -257,7 +268,6 @@ impl Replay {
             width: self.width,
             joints,
             part: [from.part, to.part],
-            middle,
             nearest: curve.nearest_to_axis(),
             curve,
             path,
@@ -276,9 +286,13 @@ impl Replay {
         }
         let to = &self.stand;
         let [x, y] = [0, 1].map(|k| to.plane[k] - from.plane[k]);
+        let words = match self.dialect.speed {
+            SpeedWord::Nozzle | SpeedWord::InverseTime => 0.0,
+            _ => x.hypot(y).hypot(to.z - from.z),
+        };
         let way = Way {
             path,
-            words: x.hypot(y).hypot(to.z - from.z),
+            words,
             filament,
             turn: to.drive.radians() - from.drive.radians(),
             radius: to.joints.map_or(0.0, |joints| joints.s.abs()),

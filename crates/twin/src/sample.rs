@@ -49,11 +49,6 @@ pub(crate) fn segment(from: Joints, to: Joints, feed: f64) -> Segment {
         width: 0.45,
         joints: Some([from, to]),
         part: [ideal.part_from_joints(&from), ideal.part_from_joints(&to)],
-        middle: ideal.part_from_joints(&joints(
-            f64::midpoint(from.s, to.s),
-            f64::midpoint(from.turn.radians(), to.turn.radians()),
-            f64::midpoint(from.z, to.z),
-        )),
         nearest: curve.nearest_to_axis(),
         curve,
         path,
@@ -83,7 +78,6 @@ pub(crate) fn part_segment(from: Point3<f64>, to: Point3<f64>) -> Segment {
     let mut moved = segment(joints(20.0, 0.0, 0.0), joints(21.0, 0.0, 0.0), 20.0);
     moved.joints = None;
     moved.part = [from, to];
-    moved.middle = nalgebra::center(&from, &to);
     moved.curve = curve;
     moved.path = curve.length();
     moved.nearest = curve.nearest_to_axis();

@@ -9,7 +9,7 @@
 //! Limits. The area of shells that overlap is counted as often as they do, holes of an open mesh
 //! leave it undefined; facets that are not finite or name no vertex are left out.
 //!
-//! Layers come from below upwards, so a sweep over facets sorted by height finds those of one
+//! Layers come from below upwards, so a sweep over facets in slabs of height finds those of one
 //! plane in time proportional to what it cuts.
 
 use mesh::mesh::Mesh;
@@ -35,11 +35,13 @@ pub struct Section {
 #[derive(Debug)]
 pub struct Sweep<'a> {
     mesh: &'a Mesh,
-    /// Facets with their extent in z, by their least z.
+    /// Facets with their extent in z, by the slab in which they begin.
     facets: Vec<Facet>,
-    /// The first facet that has not begun at the last plane.
+    slabs: Slabs,
+    /// The first facet of a slab above the last plane.
     next: usize,
-    /// Facets that had begun and not ended at the last plane, as indices of `facets`.
+    /// Facets of the slabs below, and of that of the last plane, that had not ended there, as
+    /// indices of `facets`.
     active: Vec<u32>,
     last: f64,
 }
@@ -51,11 +53,17 @@ struct Facet {
     triangle: u32,
 }
 
+/// Facets in a slab, about: fewer slabs than layers have facets, more than there are layers.
+const FACETS_OF_A_SLAB: usize = 16;
+
+/// Points in a slab, about: as many as a piece of an outline passes.
+const POINTS_OF_A_SLAB: usize = 4;
+
 impl<'a> Sweep<'a> {
     /// Prepares to cut `mesh`.
     #[must_use]
     pub fn new(mesh: &'a Mesh) -> Self {
-        let mut facets: Vec<Facet> = (0_u32..)
+        let facets: Vec<Facet> = (0_u32..)
             .zip(&mesh.triangles)
             .filter_map(|(triangle, corners)| {
                 let z = corners_of(mesh, corners)?.map(|p| p.z);
@@ -63,9 +71,10 @@ impl<'a> Sweep<'a> {
                 Some(Facet { least, most, triangle })
             })
             .collect();
-        facets
-            .sort_unstable_by(|a, b| a.least.total_cmp(&b.least).then(a.triangle.cmp(&b.triangle)));
-        Self { mesh, facets, next: 0, active: Vec::new(), last: f64::NEG_INFINITY }
+        let heights: Vec<f64> = facets.iter().map(|facet| facet.least).collect();
+        let (slabs, order) = Slabs::sort(&heights, FACETS_OF_A_SLAB);
+        let facets = order.iter().map(|&k| facets[k as usize]).collect();
+        Self { mesh, facets, slabs, next: 0, active: Vec::new(), last: f64::NEG_INFINITY }
     }
 
     /// Cuts at height `z`, replacing what `section` held.
@@ -76,10 +85,9 @@ impl<'a> Sweep<'a> {
             self.active.clear();
         }
         self.last = z;
-        while self.facets.get(self.next).is_some_and(|facet| facet.least < z) {
-            self.active.push(self.next as u32);
-            self.next += 1;
-        }
+        let end = self.slabs.end(z).max(self.next);
+        self.active.extend(self.next as u32..end as u32);
+        self.next = end;
         let (facets, mesh) = (&self.facets, self.mesh);
         self.active.retain(|&facet| facets[facet as usize].most >= z);
         let cut = |&facet: &u32| {
@@ -87,6 +95,60 @@ impl<'a> Sweep<'a> {
             piece(&corners_of(mesh, corners)?, z)
         };
         section.pieces.extend(self.active.iter().filter_map(cut));
+    }
+}
+
+/// Numbers in slabs of one thickness, and where those of each end in a row that is sorted by slab.
+/// Counting sorts them in one pass; that they are in no order within a slab costs a search no more
+/// than a look at each.
+#[derive(Debug)]
+struct Slabs {
+    low: f64,
+    /// Slabs for a difference of 1.
+    density: f64,
+    ends: Vec<u32>,
+}
+
+impl Slabs {
+    /// Returns the slabs, of about `each` numbers, and the indices of the numbers slab by slab.
+    fn sort(numbers: &[f64], each: usize) -> (Self, Vec<u32>) {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for &number in numbers {
+            (low, high) = (low.min(number), high.max(number));
+        }
+        let count = numbers.len() / each + 1;
+        let density = if high > low { count as f64 / (high - low) } else { 0.0 };
+        let mut slabs = Self { low, density, ends: vec![0; count] };
+        for &number in numbers {
+            let slab = slabs.of(number);
+            slabs.ends[slab] += 1;
+        }
+        let mut end = 0;
+        for count in &mut slabs.ends {
+            end += std::mem::replace(count, end);
+        }
+        let mut sorted = vec![0; numbers.len()];
+        for (index, &number) in (0_u32..).zip(numbers) {
+            let slab = slabs.of(number);
+            sorted[slabs.ends[slab] as usize] = index;
+            slabs.ends[slab] += 1;
+        }
+        (slabs, sorted)
+    }
+
+    /// The slab of a number; the outermost for what lies beyond.
+    fn of(&self, number: f64) -> usize {
+        (((number - self.low) * self.density).max(0.0) as usize).min(self.ends.len() - 1)
+    }
+
+    /// Where the slab of a number begins.
+    fn begin(&self, number: f64) -> usize {
+        self.of(number).checked_sub(1).map_or(0, |before| self.ends[before] as usize)
+    }
+
+    /// Where the slab of a number ends; at the begin for what is below all.
+    fn end(&self, number: f64) -> usize {
+        if number >= self.low { self.ends[self.of(number)] as usize } else { 0 }
     }
 }
 
@@ -110,9 +172,8 @@ impl Section {
     /// Returns how often the outline winds round each of `points`, in their order.
     #[must_use]
     pub fn windings(&self, points: &[Point2<f64>]) -> Vec<i32> {
-        let mut order: Vec<usize> = (0..points.len()).collect();
-        order.sort_by(|&a, &b| points[a].y.total_cmp(&points[b].y));
-        let heights: Vec<f64> = order.iter().map(|&i| points[i].y).collect();
+        let heights: Vec<f64> = points.iter().map(|p| p.y).collect();
+        let (slabs, order) = Slabs::sort(&heights, POINTS_OF_A_SLAB);
         let mut windings = vec![0; points.len()];
         for piece in &self.pieces {
             let (low, high, sign) = if piece.from.y < piece.to.y {
@@ -120,12 +181,12 @@ impl Section {
             } else {
                 (piece.to, piece.from, -1)
             };
-            // A ray towards +x meets pieces with low.y <= y < high.y.
-            let first = heights.partition_point(|&y| y < low.y);
-            let end = heights.partition_point(|&y| y < high.y);
-            for &i in order.get(first..end).unwrap_or_default() {
-                if (high - low).perp(&(points[i] - low)) > 0.0 {
-                    windings[i] += sign;
+            let near = slabs.begin(low.y)..slabs.end(high.y);
+            for &i in order.get(near).unwrap_or_default() {
+                let p = points[i as usize];
+                // A ray towards +x meets pieces with low.y <= y < high.y.
+                if low.y <= p.y && p.y < high.y && (high - low).perp(&(p - low)) > 0.0 {
+                    windings[i as usize] += sign;
                 }
             }
         }

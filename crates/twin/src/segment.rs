@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 
 use crate::curve::Curve;
+use machine::kinematics::Alignment;
 use machine::program::{Feed, Joints, Role};
 
 /// What a segment does.
@@ -37,8 +38,6 @@ pub struct Segment {
     pub joints: Option<[Joints; 2]>,
     /// Where the nozzle is in the part at both ends, mm.
     pub part: [Point3<f64>; 2],
-    /// Where it is halfway, mm: on an arc, far from the middle of the chord.
-    pub middle: Point3<f64>,
     /// The path over the bed.
     pub curve: Curve,
     /// The length of the path over the part, lift included, mm.
@@ -73,6 +72,14 @@ impl Segment {
         } else {
             Kind::Still
         }
+    }
+
+    /// Returns where in the part it is halfway on a machine that is aligned like this, mm: on an
+    /// arc, far from the middle of the chord.
+    #[must_use]
+    pub fn middle(&self, alignment: &Alignment) -> Point3<f64> {
+        let halfway = alignment.part_from_bed(&self.curve.over_bed(0.5));
+        Point3::new(halfway.x, halfway.y, f64::midpoint(self.part[0].z, self.part[1].z))
     }
 
     /// Returns whether it lays material on the way.

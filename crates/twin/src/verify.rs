@@ -21,6 +21,7 @@
 //! keeps the heights of what was laid.
 
 use machine::gcode::dialect::{Dialect, Space};
+use machine::gcode::{Command, MOST_COLUMNS};
 use machine::profile::Printer;
 use mesh::mesh::Mesh;
 
@@ -142,7 +143,7 @@ impl<'a> Verifier<'a> {
             surface: Surface::new(printer),
             flow: Flow::new(printer, filament_area),
             volume: Volume::new(filament_area, printer.nozzle_diameter),
-            deposit: Deposit::default(),
+            deposit: Deposit::new(printer),
             watch: setup.thorough.then(|| Watch::new(&setup)),
             part: mesh.map(Part::new),
             setup,
@@ -151,14 +152,17 @@ impl<'a> Verifier<'a> {
 
     /// Judges the next line, and returns its motion for whoever draws it.
     pub fn line(&mut self, text: &str) -> Option<Segment> {
-        let place = self.next_place();
-        self.text.characters(text.as_bytes(), place, &mut self.findings);
-        self.readable(text, place)
+        self.line_bytes(text.as_bytes())
     }
 
     /// Judges the next line, whatever bytes it is made of.
     pub fn line_bytes(&mut self, text: &[u8]) -> Option<Segment> {
         let place = self.next_place();
+        let mut command = Command::BLANK;
+        // There is nothing to say of the characters of a plain line.
+        if text.len() <= MOST_COLUMNS && command.read_plain(text) {
+            return self.command(&command, place);
+        }
         self.text.characters(text, place, &mut self.findings);
         match std::str::from_utf8(text) {
             Ok(text) => self.readable(text, place),
@@ -179,8 +183,10 @@ impl<'a> Verifier<'a> {
         self.continuity.end(place, &mut self.findings);
         self.heat.end(place, &mut self.findings);
         self.flow.end(place, &mut self.findings);
-        let enclosed =
-            self.setup.mesh.map(|mesh| Enclosed { volume: volume(mesh), surface: surface(mesh) });
+        let enclosed = self
+            .setup
+            .mesh
+            .map(|mesh| || Enclosed { volume: volume(mesh), surface: surface(mesh) });
         let unjudged = self.volume.end(enclosed, self.setup.solid, &mut self.findings);
         let mut notes: Vec<&'static str> = unjudged.into_iter().collect();
         if self.setup.dialect.space == Space::Part {
@@ -208,11 +214,24 @@ impl<'a> Verifier<'a> {
                 return None;
             }
         };
-        if let Some(command) = &line.command {
-            self.text.command(command, place, &mut self.findings);
-            self.modes.command(command, place, &mut self.findings);
+        match &line.command {
+            Some(command) => self.command(command, place),
+            None => {
+                let event = self.replay.follow(&line);
+                self.event(event, place)
+            }
         }
-        match self.replay.follow(&line) {
+    }
+
+    fn command(&mut self, command: &Command<'_>, place: Place) -> Option<Segment> {
+        self.text.command(command, place, &mut self.findings);
+        self.modes.command(command, place, &mut self.findings);
+        let event = self.replay.follow_command(command);
+        self.event(event, place)
+    }
+
+    fn event(&mut self, event: Event, place: Place) -> Option<Segment> {
+        match event {
             Event::Nothing => {}
             Event::Segment(segment) => {
                 self.segment(&segment);

@@ -3,6 +3,9 @@
 //! Takes what firmwares take: spaces anywhere between words, lower case, line numbers and
 //! checksums, comments after `;`. Numbers are plain decimals; anything else is an error with its
 //! place. Never panics, whatever the text.
+//!
+//! Lines as rhumb writes them itself are most of any of its programs, and have a shorter way:
+//! [`Command::read_plain`].
 
 /// A line, taken apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,12 +45,48 @@ pub struct SyntaxError {
 }
 
 impl Command<'_> {
+    /// A command without words, for [`read_plain`](Self::read_plain) to fill.
+    pub const BLANK: Self = Self { code: Code::Named(""), values: [0.0; 26], given: 0 };
+
+    /// Reads a line that is a command in the plainest form: an upper-case letter and a number, then
+    /// words of an upper-case letter and a decimal number each, no letter twice, one blank between
+    /// them and nothing else. Returns whether it was one; the others are for [`parse_line`], and
+    /// what this command says then is undefined.
+    pub fn read_plain(&mut self, line: &[u8]) -> bool {
+        let Some((code, rest)) = plain_code(line) else { return false };
+        (self.code, self.given) = (code, 0);
+        let mut rest = rest;
+        while let Some((&blank, word)) = rest.split_first() {
+            let Some((&letter, number)) = word.split_first() else { return false };
+            let index = usize::from(letter.wrapping_sub(b'A'));
+            let bit = 1_u32.checked_shl(index as u32).unwrap_or(0);
+            let is_second_command = matches!(letter, b'G' | b'M' | b'N');
+            if blank != b' ' || index >= 26 || self.given & bit != 0 || is_second_command {
+                return false;
+            }
+            let Some((value, after)) = plain_number(number) else { return false };
+            self.values[index] = value;
+            self.given |= bit;
+            rest = after;
+        }
+        true
+    }
+
     /// Returns the number of the word with this (upper-case) letter.
     #[must_use]
     pub fn word(&self, letter: u8) -> Option<f64> {
         let index = usize::from(letter.checked_sub(b'A')?);
         let is_given = index < 26 && self.given & (1 << index) != 0;
         is_given.then(|| self.values[index])
+    }
+
+    /// Returns the first letter of the alphabet that has a word and is none of `known`.
+    #[must_use]
+    pub fn letter_besides(&self, known: &[u8]) -> Option<u8> {
+        let bit = |letter: &u8| 1_u32.checked_shl(u32::from(letter.wrapping_sub(b'A')));
+        let known = known.iter().filter_map(bit).fold(0, |all, bit| all | bit);
+        let others = self.given & !known;
+        (b'A'..=b'Z').nth(others.trailing_zeros() as usize)
     }
 
     /// Returns whether this is the numbered command, such as `(b'G', 1)`.
@@ -95,6 +134,52 @@ pub fn parse_line(text: &str) -> Result<Line<'_>, SyntaxError> {
         command.values[index] = value;
         command.given |= 1 << index;
     }
+}
+
+/// Reads `G1` and the like.
+fn plain_code(line: &[u8]) -> Option<(Code<'static>, &[u8])> {
+    let (&letter, rest) = line.split_first()?;
+    // More digits than any command has go the long way, as do fractions.
+    let digits = rest.iter().take(4).take_while(|c| c.is_ascii_digit()).count();
+    let (digits, rest) = rest.split_at(digits);
+    let number = digits.iter().fold(0, |number, digit| 10 * number + u32::from(digit - b'0'));
+    let is_plain = letter.is_ascii_uppercase() && !digits.is_empty() && letter != b'N';
+    is_plain.then_some((Code::Numbered(letter, number, 0), rest))
+}
+
+/// Powers of ten that a number of type `f64` holds exactly, as far as [`plain_number`] needs them.
+const TENS: [f64; 16] =
+    [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+
+/// Reads a decimal number with digits on both sides of its point, if it has one, and at most 15 in
+/// all; a negative zero is none. Digits and power of ten are exact, so their quotient is rounded
+/// once, and is the number that reading it digit by digit gives (W. D. Clinger, 1990, "How to read
+/// floating point numbers accurately").
+fn plain_number(text: &[u8]) -> Option<(f64, &[u8])> {
+    let is_negative = text.first() == Some(&b'-');
+    let start = usize::from(is_negative);
+    let mut digits = 0_u64;
+    let mut at = start;
+    let mut point = None;
+    while let Some(&byte) = text.get(at) {
+        let digit = byte.wrapping_sub(b'0');
+        if digit <= 9 {
+            digits = digits.wrapping_mul(10).wrapping_add(u64::from(digit));
+        } else if byte == b'.' && point.is_none() {
+            point = Some(at);
+        } else {
+            break;
+        }
+        at += 1;
+    }
+    let decimals = point.map_or(0, |point| at - point - 1);
+    let whole = point.unwrap_or(at) - start;
+    let is_plain = whole > 0 && (decimals > 0 || point.is_none()) && whole + decimals <= 15;
+    if !is_plain || (is_negative && digits == 0) {
+        return None;
+    }
+    let value = digits as f64 / TENS[decimals];
+    Some((if is_negative { -value } else { value }, &text[at..]))
 }
 
 struct Words<'a> {
@@ -215,6 +300,77 @@ mod tests {
         assert_eq!(command("M104 S200").word(b'S'), Some(200.0));
         assert_eq!(command("M104 S200").word(b'@'), None);
         assert_eq!(command("M104 S200").word(200), None);
+        assert_eq!(command("G1 X1 Z2 B3").letter_besides(b"XYZ"), Some(b'B'));
+        assert_eq!(command("G1 X1 Z2").letter_besides(b"ZX"), None);
+    }
+
+    #[test]
+    fn plain_lines_are_read_the_same_way() {
+        let mut plain = Command::BLANK;
+        for text in [
+            "G1 R12.345 T-93.1235 Z0.2 E0.03123 F1500",
+            "G1 E-0.8 F2400",
+            "G92 E0",
+            "M104 S210",
+            "G28",
+            "G1 X0.1 Y-0.00001 Z123456789.012345",
+            "G1 R0 T0.0000",
+        ] {
+            assert!(plain.read_plain(text.as_bytes()), "{text}");
+            let long = command(text);
+            assert_eq!((plain.code, plain.given), (long.code, long.given), "{text}");
+            for letter in b'A'..=b'Z' {
+                assert_eq!(plain.word(letter), long.word(letter), "{text}");
+            }
+        }
+        for text in [
+            "",
+            ";",
+            "G1 ",
+            "G1  X1",
+            "G1 X1 ",
+            " G1 X1",
+            "G1 X1;",
+            "G1 X",
+            "G1 X-",
+            "G1 X.5",
+            "G1 X5.",
+            "G1 X-0",
+            "G1 X+1",
+            "G1 X1e1",
+            "G1 X1 X2",
+            "G1 X1 G1",
+            "g1 X1",
+            "G1 x1",
+            "G",
+            "N5 G1",
+            "G92.1",
+            "G1 X1.2.3",
+            "G1 X1234567890123456",
+            "G00001",
+            "M117 Hello",
+            "G1X1",
+            "G1 \u{e9}1",
+            "G1 X1*31",
+        ] {
+            assert!(!plain.read_plain(text.as_bytes()), "{text}");
+        }
+    }
+
+    #[test]
+    fn every_decimal_is_read_as_the_nearest_number() {
+        let mut state = 5_u64;
+        for _ in 0..20_000 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let decimals = (state >> 60) as usize % 7;
+            let number = (state >> 20) as f64 / 1e9 - 4000.0;
+            let text = format!("{number:.decimals$}");
+            if number < 0.0 && text.bytes().all(|c| matches!(c, b'-' | b'0' | b'.')) {
+                continue;
+            }
+            let (read, rest) = plain_number(text.as_bytes()).unwrap();
+            assert_eq!((read, rest.len()), (text.parse().unwrap(), 0), "{text}");
+        }
     }
 
     #[test]

@@ -10,6 +10,8 @@
 //! are too many, every other one is dropped and only every second, fourth, eighth … is taken from
 //! then on. Planar layers in which the nozzle leaves its plane are not judged. mm, part frame.
 
+use machine::kinematics::Alignment;
+use machine::profile::Printer;
 use machine::program::Role;
 use mesh::mesh::Mesh;
 use nalgebra::{Point2, Point3, Vector3};
@@ -74,6 +76,7 @@ pub(crate) struct Deposit {
     every: usize,
     layer: Option<usize>,
     family: Family,
+    alignment: Alignment,
     top: f64,
     /// Half the thickness of the layer, mm.
     half_height: f64,
@@ -82,6 +85,12 @@ pub(crate) struct Deposit {
 }
 
 impl Deposit {
+    /// Returns the check for this printer.
+    #[must_use]
+    pub(crate) fn new(printer: &Printer) -> Self {
+        Self { alignment: printer.alignment, ..Self::default() }
+    }
+
     /// Begins a layer.
     pub(crate) fn layer(&mut self, mark: &LayerMark) {
         self.samples.clear();
@@ -101,7 +110,7 @@ impl Deposit {
             let off = (from.z - self.top).abs().max((to.z - self.top).abs());
             self.is_sound = !exceeds(off, rounding::IN_PLANE);
         }
-        let middle = segment.middle;
+        let middle = segment.middle(&self.alignment);
         let along = to - from;
         let aside = self.family.normal(&middle).cross(&along);
         let length = aside.norm();

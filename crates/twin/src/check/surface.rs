@@ -16,6 +16,7 @@
 //! A program that announces its surfaces (see [`crate::family`]) claims all this, and what is found
 //! is an error. Of others it is a warning: a wall that climbs in a helix is printed on purpose.
 
+use machine::kinematics::Alignment;
 use machine::profile::Printer;
 use machine::program::Role;
 use nalgebra::Point3;
@@ -41,6 +42,7 @@ pub const ROUND_AXIS: f64 = 2.0;
 pub(crate) struct Surface {
     /// Nearer to the axis cones are not judged, mm.
     tip: f64,
+    alignment: Alignment,
     mark: Option<LayerMark>,
     samples: Vec<Sample>,
     /// The layer before: its family and level.
@@ -61,6 +63,7 @@ impl Surface {
     pub(crate) fn new(printer: &Printer) -> Self {
         Self {
             tip: ROUND_AXIS * printer.axis_clearance,
+            alignment: printer.alignment,
             mark: None,
             samples: Vec::new(),
             last: None,
@@ -83,13 +86,14 @@ impl Surface {
         let line = segment.line;
         let tip = if let Family::Conical { .. } = family { self.tip } else { 0.0 };
         let mut sample = |at: Point3<f64>| {
-            if at.x.hypot(at.y) >= tip || at.x.is_nan() {
+            // Written so that what is not a number is judged.
+            if !(tip > 0.0 && at.x.hypot(at.y) < tip) {
                 self.samples.push(Sample { line, at, level: family.level(&at) });
             }
         };
         sample(segment.part[0]);
         if family != Family::Planar {
-            sample(segment.middle);
+            sample(segment.middle(&self.alignment));
         }
         sample(segment.part[1]);
     }

@@ -122,11 +122,8 @@ impl Text {
                 format!("{first} and {second} must come together, one of them is missing")
             });
         }
-        let is_known = |letter: u8| {
-            b"ZEF".contains(&letter) || self.dialect.plane.iter().any(|word| word.letter == letter)
-        };
-        let foreign = |letter: &u8| command.word(*letter).is_some() && !is_known(*letter);
-        if let Some(letter) = (b'A'..=b'Z').find(foreign) {
+        let [first, second] = self.dialect.plane.map(|word| word.letter);
+        if let Some(letter) = command.letter_besides(&[b'Z', b'E', b'F', first, second]) {
             let name = self.dialect.name;
             findings.error(NAME, place, (1.0, 0.0), || {
                 format!("the word {} means nothing in a move of dialect {name}", letter as char)

@@ -140,7 +140,7 @@ impl Volume {
     /// meant to be. Returns what could not be judged.
     pub(crate) fn end(
         &self,
-        enclosed: Option<Enclosed>,
+        enclosed: Option<impl FnOnce() -> Enclosed>,
         is_solid: bool,
         findings: &mut Findings,
     ) -> Option<&'static str> {
@@ -161,7 +161,7 @@ impl Volume {
         } else {
             let note = "volume: layers are curved or lack ;Z: or ;HEIGHT:, only the whole print \
                         is compared";
-            (self.whole_mesh(&enclosed), Some(note))
+            (self.whole_mesh(&enclosed()), Some(note))
         };
         whole(laid, &bill, is_solid, place, findings);
         note
@@ -289,7 +289,7 @@ mod tests {
         }
         let mut findings = Findings::default();
         let enclosed = Enclosed { volume: 400.0, surface: 880.0 };
-        assert_eq!(check.end(Some(enclosed), is_solid, &mut findings), None);
+        assert_eq!(check.end(Some(|| enclosed), is_solid, &mut findings), None);
         findings.kept().iter().map(|finding| finding.line).collect()
     }
 
@@ -328,9 +328,14 @@ mod tests {
     fn what_cannot_be_judged_is_said() {
         let mut findings = Findings::default();
         let mut check = Volume::new(2.0, 0.4);
-        assert!(check.end(None, true, &mut findings).unwrap().contains("without a mesh"));
+        assert!(
+            check
+                .end(None::<fn() -> Enclosed>, true, &mut findings)
+                .unwrap()
+                .contains("without a mesh")
+        );
         let small = Enclosed { volume: 1.0, surface: 6.0 };
-        assert!(check.end(Some(small), true, &mut findings).unwrap().contains("no layers"));
+        assert!(check.end(Some(|| small), true, &mut findings).unwrap().contains("no layers"));
         let mark = LayerMark { line: 4, index: 0, top: Some(1.0), height: Some(1.0), family: None };
         check.layer(mark, Some(&section_at(0.5)));
         let mut rising = segment(joints(5.0, 0.0, 0.5), joints(9.0, 1.0, 1.0), 20.0);
@@ -339,10 +344,10 @@ mod tests {
         let block = block(10.0, 0.0, 1.0, 0.0);
         let mesh = Enclosed { volume: section::volume(&block), surface: section::surface(&block) };
         assert_eq!(mesh.surface, 880.0);
-        assert!(check.end(Some(mesh), true, &mut findings).unwrap().contains("curved"));
+        assert!(check.end(Some(|| mesh), true, &mut findings).unwrap().contains("curved"));
         assert!(findings.checks().is_empty());
         check.segment(&rising);
-        check.end(Some(mesh), true, &mut findings);
+        check.end(Some(|| mesh), true, &mut findings);
         assert_eq!(findings.checks(), [NAME]);
     }
 }
