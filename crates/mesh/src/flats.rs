@@ -48,12 +48,30 @@ pub struct FlatParams {
 /// A run of facets is a face when one slab holds this share of its area; otherwise it is a slope.
 const LEAST_SHARE_OF_RUN: f64 = 0.5;
 
-/// A facet that may belong to a face.
+/// A facet that may belong to a face, or all those at one height that look the same way.
 #[derive(Debug, Clone, Copy)]
 struct Level {
     z: f64,
-    area: f64,
+    area: Area,
     facing: Facing,
+}
+
+/// An area in whole parts of [`Area::UNIT_MM2`]: sums do not depend on the order of the facets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Area(u128);
+
+impl Area {
+    /// A power of two, so that areas with few digits are exact; a million roundings are less than
+    /// the last digit of a report.
+    const UNIT_MM2: f64 = 1.0 / (1_u64 << 40) as f64;
+
+    fn of(mm2: f64) -> Self {
+        Self((mm2 / Self::UNIT_MM2).round() as u128)
+    }
+
+    fn mm2(self) -> f64 {
+        self.0 as f64 * Self::UNIT_MM2
+    }
 }
 
 /// Returns the flat faces, from the bed up; of two at one height the one that looks down is first.
@@ -64,11 +82,7 @@ pub fn flats(mesh: &Mesh, params: &FlatParams) -> Vec<Flat> {
     let cosine = params.angle_rad.cos();
     let facets = (0..mesh.triangles.len() as u32).into_par_iter();
     let level = |facet| level(mesh, facet, cosine, params.depth_mm);
-    let mut facets: Vec<Level> = facets.filter_map(level).collect();
-    // All of the key, so that sums do not depend on the order of the facets.
-    facets.par_sort_unstable_by(|a, b| {
-        a.facing.cmp(&b.facing).then(a.z.total_cmp(&b.z)).then(a.area.total_cmp(&b.area))
-    });
+    let facets = levels(facets.filter_map(level).collect());
     let one_run = |a: &Level, b: &Level| a.facing == b.facing && b.z - a.z <= params.depth_mm;
     let mut flats: Vec<Flat> =
         facets.chunk_by(one_run).filter_map(|run| face(run, params.depth_mm)).collect();
@@ -88,35 +102,54 @@ fn level(mesh: &Mesh, facet: u32, cosine: f64, depth: f64) -> Option<Level> {
     let area = twice.norm() / 2.0;
     let facing = if twice.z < 0.0 { Facing::Down } else { Facing::Up };
     let is_level = area > 0.0 && twice.z.abs() >= 2.0 * area * cosine;
-    is_level.then(|| Level { z: (a + b + c) / 3.0, area, facing })
+    is_level.then(|| Level { z: (a + b + c) / 3.0, area: Area::of(area), facing })
+}
+
+/// The facets at one height that look the same way as one, by that and by height.
+fn levels(mut facets: Vec<Level>) -> Vec<Level> {
+    // Most facets lie in few heights: such keys are sorted in almost no time.
+    let key = |facet: &Level| (facet.facing, ordered_bits(facet.z));
+    facets.sort_unstable_by_key(key);
+    let sum = |same: &[Level]| {
+        let area = same.iter().map(|facet| facet.area.0).sum();
+        Level { area: Area(area), ..same[0] }
+    };
+    facets.chunk_by(|a, b| key(a) == key(b)).map(sum).collect()
+}
+
+/// The bits of a number as an integer of the same order.
+fn ordered_bits(x: f64) -> i64 {
+    let bits = (x + 0.0).to_bits() as i64;
+    bits ^ (((bits >> 63) as u64) >> 1) as i64
 }
 
 /// The face in a run of facets, by height, without gaps larger than the depth.
 fn face(run: &[Level], depth: f64) -> Option<Flat> {
-    let all: f64 = run.iter().map(|facet| facet.area).sum();
+    let total = |facets: &[Level]| facets.iter().map(|facet| facet.area.0).sum();
+    let all = Area(total(run)).mm2();
     let slab = heaviest_slab(run, 2.0 * depth);
-    let area: f64 = slab.iter().map(|facet| facet.area).sum();
+    let area = Area(total(slab)).mm2();
     if area < LEAST_SHARE_OF_RUN * all {
         return None;
     }
     // Relative to the lowest: the height of a face of one height is exactly that.
     let base = slab[0].z;
-    let above: f64 = slab.iter().map(|facet| (facet.z - base) * facet.area).sum();
+    let above: f64 = slab.iter().map(|facet| (facet.z - base) * facet.area.mm2()).sum();
     Some(Flat { z_mm: base + above / area, area_mm2: area, facing: slab[0].facing })
 }
 
 /// The facets of the slab of a height with the most area; the lowest of several.
 fn heaviest_slab(run: &[Level], height: f64) -> &[Level] {
-    let (mut best, mut most) = (0..0, f64::NEG_INFINITY);
-    let (mut start, mut area) = (0, 0.0);
+    let (mut best, mut most) = (0..0, None);
+    let (mut start, mut area) = (0, 0);
     for (end, facet) in run.iter().enumerate() {
-        area += facet.area;
+        area += facet.area.0;
         while facet.z - run[start].z > height {
-            area -= run[start].area;
+            area -= run[start].area.0;
             start += 1;
         }
-        if area > most {
-            (best, most) = (start..end + 1, area);
+        if most.is_none_or(|most| area > most) {
+            (best, most) = (start..end + 1, Some(area));
         }
     }
     &run[best]
