@@ -78,7 +78,7 @@ fn whole(bytes: &[u8], settings: &Settings, job: &Job) -> (Vec<u8>, Outcome) {
 
 fn model(name: &'static str, path: &Path, settings: &Settings, job: &Job) -> Option<Model> {
     let bytes = std::fs::read(path).ok()?;
-    let solid = place(&read(&bytes), &Wish::default(), &job.orient).unwrap().solid;
+    let solid = place(read(&bytes), &Wish::default(), &job.orient).unwrap().solid;
     let levels = layout(solid.mesh(), &Plane, job).unwrap().levels;
     let sections = sections(&solid, &levels, job);
     let (program, outcome) = whole(&bytes, settings, job);

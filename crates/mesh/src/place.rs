@@ -11,7 +11,8 @@ pub use azimuth::reference_azimuth;
 use crate::mesh::Mesh;
 use crate::topology::Solid;
 use geom::circle::{Circle, smallest_around};
-use nalgebra::{Isometry3, Point2, Point3, Rotation3, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Rotation3, Vector2, Vector3};
+use std::f64::consts::TAU;
 
 /// How a part gets from the Model frame to the Part frame: turned, then shifted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,11 +27,12 @@ impl Placement {
     /// Returns the placement that sets a mesh, turned by `rotation`, on the bed and on the axis.
     #[must_use]
     pub fn on_bed(mesh: &Mesh, rotation: &Rotation3<f64>) -> Self {
-        let turned = Self { rotation: *rotation, shift: Vector3::zeros() }.mesh(mesh);
-        let shift = match footprint(&turned) {
+        let turned = || mesh.vertices.iter().map(|p| rotation * p);
+        let shift = match smallest_around(&outermost(turned)) {
             None => Vector3::zeros(),
             Some(circle) => {
-                Vector3::new(-circle.centre.x, -circle.centre.y, -turned.bounds().min.z)
+                let bottom = turned().map(|p| p.z).fold(f64::INFINITY, f64::min);
+                Vector3::new(-circle.centre.x, -circle.centre.y, -bottom)
             }
         };
         Self { rotation: *rotation, shift }
@@ -69,38 +71,71 @@ pub fn placed(solid: &Solid, rotation: &Rotation3<f64>) -> (Solid, Placement) {
 /// Returns the smallest circle around a mesh seen from above; `None` when it has no vertices.
 #[must_use]
 pub fn footprint(mesh: &Mesh) -> Option<Circle> {
-    smallest_around(&outermost(mesh))
+    smallest_around(&outermost(|| mesh.vertices.iter().copied()))
 }
 
-/// The vertices seen from above, without those that are surely inside their hull: a hull needs a
+/// The points seen from above, without those that are surely inside their hull: a hull needs a
 /// sort of its points, and most points of a mesh are inside.
-fn outermost(mesh: &Mesh) -> Vec<Point2<f64>> {
-    let points = || mesh.vertices.iter().map(|p| p.xy());
+fn outermost<I: Iterator<Item = Point3<f64>>>(points: impl Fn() -> I) -> Vec<Point2<f64>> {
+    let points = || points().map(|p| p.xy());
+    // Points far out in each direction and its opposite are in the hull, and so is all between.
     const N_DIRECTIONS: usize = 16;
-    let directions: Vec<[f64; 2]> = (0..N_DIRECTIONS)
-        .map(|i| (i as f64 / N_DIRECTIONS as f64 * std::f64::consts::TAU).sin_cos())
-        .map(|(sin, cos)| [cos, sin])
-        .collect();
-    let mut far = vec![(f64::NEG_INFINITY, Point2::origin()); N_DIRECTIONS];
+    const N_WAYS: usize = N_DIRECTIONS / 2;
+    let ways: [[f64; 2]; N_WAYS] = std::array::from_fn(|i| {
+        let (sin, cos) = (i as f64 / N_DIRECTIONS as f64 * TAU).sin_cos();
+        [cos, sin]
+    });
+    let mut far = [(f64::NEG_INFINITY, Point2::origin()); N_DIRECTIONS];
     for p in points() {
-        for (far, [x, y]) in far.iter_mut().zip(&directions) {
+        for (i, [x, y]) in ways.iter().enumerate() {
             let reach = p.x * x + p.y * y;
-            if reach > far.0 {
-                *far = (reach, p);
+            if reach > far[i].0 {
+                far[i] = (reach, p);
+            }
+            if -reach > far[i + N_WAYS].0 {
+                far[i + N_WAYS] = (-reach, p);
             }
         }
     }
-    // The points that reach farthest are corners of the hull; a circle within them is inside it.
-    let corners: Vec<Point2<f64>> = far.iter().map(|(_, p)| *p).collect();
-    let mean = corners.iter().map(|p| p.coords).sum::<nalgebra::Vector2<f64>>();
+    let corners = far.map(|(_, p)| p);
+    let mean = corners.iter().map(|p| p.coords).sum::<Vector2<f64>>();
     let centre = Point2::from(mean / N_DIRECTIONS as f64);
+    let inside = inscribed(&corners, &centre);
+    let left: Vec<Point2<f64>> =
+        points().filter(|p| nalgebra::distance(p, &centre) >= inside).collect();
+    if left.len() <= FEW { left } else { far_in_sectors(left, &centre) }
+}
+
+/// A hull of so many points takes no time to speak of.
+const FEW: usize = 4096;
+
+/// A round part has much of its surface near its outline: points that are surely inside what lies
+/// farthest from the centre in each of many sectors are left out too.
+fn far_in_sectors(points: Vec<Point2<f64>>, centre: &Point2<f64>) -> Vec<Point2<f64>> {
+    const N_SECTORS: usize = 512;
+    let mut far: Vec<Option<(f64, Point2<f64>)>> = vec![None; N_SECTORS];
+    for p in &points {
+        let arm = p - centre;
+        let turn = (arm.y.atan2(arm.x) / TAU).rem_euclid(1.0);
+        let slot = &mut far[((turn * N_SECTORS as f64) as usize).min(N_SECTORS - 1)];
+        if slot.is_none_or(|(most, _)| arm.norm_squared() > most) {
+            *slot = Some((arm.norm_squared(), *p));
+        }
+    }
+    let corners: Vec<Point2<f64>> = far.into_iter().flatten().map(|(_, p)| p).collect();
+    let inside = inscribed(&corners, centre);
+    points.into_iter().filter(|p| nalgebra::distance(p, centre) >= inside).collect()
+}
+
+/// The radius of a circle about a centre that is inside a polygon; not above 0 when the centre is
+/// outside.
+fn inscribed(corners: &[Point2<f64>], centre: &Point2<f64>) -> f64 {
     let apart = |i: usize| {
-        let (a, b) = (corners[i], corners[(i + 1) % N_DIRECTIONS]);
+        let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);
         let side = b - a;
         if side.norm() == 0.0 { f64::INFINITY } else { side.perp(&(centre - a)) / side.norm() }
     };
-    let inside = (0..N_DIRECTIONS).map(apart).fold(f64::INFINITY, f64::min);
-    points().filter(|p| nalgebra::distance(p, &centre) >= inside).collect()
+    (0..corners.len()).map(apart).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -144,7 +179,7 @@ mod tests {
             assert!((a.centre - b.centre).norm() < 1e-9, "{name}");
             assert!((a.radius - b.radius).abs() < 1e-9, "{name}");
         }
-        assert!(outermost(&shapes::icosphere(4, 10.0)).len() < 1000);
+        assert!(outermost(|| shapes::icosphere(4, 10.0).vertices.into_iter()).len() < 1000);
         assert_eq!(footprint(&Mesh::default()), None);
     }
 }

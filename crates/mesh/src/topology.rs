@@ -25,6 +25,7 @@ use crate::note::Tally;
 use geom::bounding::Bounds;
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Marks that there is no half-edge.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -33,13 +34,20 @@ pub(crate) const NONE: u32 = u32::MAX;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solid {
     mesh: Mesh,
+    joins: Arc<Joins>,
+    shells: Vec<Shell>,
+    open_sides: usize,
+    nonmanifold_edges: Tally,
+}
+
+/// How triangles are joined. A solid that is moved has the same, so they share it: it is twice as
+/// large as the mesh.
+#[derive(Debug, PartialEq)]
+struct Joins {
     sides: Vec<[u32; 3]>,
     ends: Vec<[u32; 2]>,
     users: Vec<[u32; 2]>,
     shell_of: Vec<u32>,
-    shells: Vec<Shell>,
-    open_sides: usize,
-    nonmanifold_edges: Tally,
 }
 
 /// A part of the surface that is connected over its sides.
@@ -78,17 +86,16 @@ impl Solid {
         let nonmanifold_edges = edges.crowded(&mesh);
         let Sides { of: sides, ends, users } = edges.into_sides(&mesh);
         let open_sides = users.iter().filter(|u| u[1] == NONE).count();
+        let mut joins = Joins { sides, ends, users, shell_of: Vec::new() };
+        let n_shells = joins.find_shells();
         let mut solid = Self {
             mesh,
-            sides,
-            ends,
-            users,
-            shell_of: Vec::new(),
-            shells: Vec::new(),
+            joins: Arc::new(joins),
+            shells: vec![Shell::empty(); n_shells as usize],
             open_sides,
             nonmanifold_edges,
         };
-        solid.find_shells();
+        solid.measure_shells();
         solid
     }
 
@@ -107,19 +114,19 @@ impl Solid {
     /// Returns, for each triangle, the side from corner `k` to corner `k + 1`.
     #[must_use]
     pub fn sides(&self) -> &[[u32; 3]] {
-        &self.sides
+        &self.joins.sides
     }
 
     /// Returns the number of sides.
     #[must_use]
     pub fn n_sides(&self) -> usize {
-        self.ends.len()
+        self.joins.ends.len()
     }
 
     /// Returns the two vertices of a side, the lower number first.
     #[must_use]
     pub fn ends(&self, side: u32) -> [u32; 2] {
-        self.ends[side as usize]
+        self.joins.ends[side as usize]
     }
 
     /// Returns the triangle across side `k` of `triangle` and the number of that side there;
@@ -131,10 +138,7 @@ impl Solid {
 
     /// Returns the half-edge on the other side.
     pub(crate) fn mate(&self, half: u32) -> Option<u32> {
-        let side = self.sides[half as usize / 3][half as usize % 3];
-        let [first, second] = self.users[side as usize];
-        let other = if first == half { second } else { first };
-        (other != NONE).then_some(other)
+        self.joins.mate(half)
     }
 
     /// Returns how many sides belong to one triangle only.
@@ -145,7 +149,7 @@ impl Solid {
 
     /// Returns the open half-edges, in the order of the sides.
     pub(crate) fn open_halves(&self) -> impl Iterator<Item = u32> {
-        self.users.iter().filter(|u| u[1] == NONE).map(|u| u[0])
+        self.joins.users.iter().filter(|u| u[1] == NONE).map(|u| u[0])
     }
 
     /// Returns the edges that more than two triangles use: how many, and their lengths, mm.
@@ -163,7 +167,7 @@ impl Solid {
     /// Returns the shell of each triangle.
     #[must_use]
     pub fn shell_of(&self) -> &[u32] {
-        &self.shell_of
+        &self.joins.shell_of
     }
 
     /// Returns the solid moved by `to_from_here`; sides and shells keep their numbers.
@@ -175,13 +179,18 @@ impl Solid {
     /// Returns the solid with every vertex moved in the same rigid way.
     #[must_use]
     pub fn moved(&self, to_from_here: impl Fn(&Point3<f64>) -> Point3<f64>) -> Self {
-        let mut moved = self.clone();
-        for p in &mut moved.mesh.vertices {
+        self.clone().into_moved(to_from_here)
+    }
+
+    /// As [`Solid::moved`], giving up the solid where it was.
+    #[must_use]
+    pub fn into_moved(mut self, to_from_here: impl Fn(&Point3<f64>) -> Point3<f64>) -> Self {
+        for p in &mut self.mesh.vertices {
             *p = to_from_here(p);
         }
-        moved.nonmanifold_edges.at = self.nonmanifold_edges.at.map(|p| to_from_here(&p));
-        moved.measure_shells();
-        moved
+        self.nonmanifold_edges.at = self.nonmanifold_edges.at.map(|p| to_from_here(&p));
+        self.find_boxes();
+        self
     }
 
     /// Returns the vertices at which fans of triangles touch that no side connects.
@@ -224,12 +233,83 @@ impl Solid {
         n
     }
 
-    fn find_shells(&mut self) {
-        let n_triangles = self.mesh.triangles.len();
-        let mut shell_of = vec![NONE; n_triangles];
+    /// Finds the boxes around the shells anew; volumes and areas stay when a solid moves.
+    fn find_boxes(&mut self) {
+        self.shells.iter_mut().for_each(|shell| shell.bounds = Bounds::default());
+        for (corners, &shell) in self.mesh.triangles.iter().zip(&self.joins.shell_of) {
+            for &v in corners {
+                self.shells[shell as usize].bounds.add(&self.mesh.vertices[v as usize]);
+            }
+        }
+    }
+
+    fn measure_shells(&mut self) {
+        let origin = measure::local_origin(&self.mesh);
+        self.shells.iter_mut().for_each(|shell| *shell = Shell::empty());
+        for (t, &shell) in (0..).zip(&self.joins.shell_of) {
+            let corners = self.mesh.corners(t);
+            let shell = &mut self.shells[shell as usize];
+            shell.first = shell.first.min(t);
+            shell.triangles += 1;
+            shell.volume_mm3 += measure::cone_volume(&origin, &corners);
+            shell.area_mm2 += measure::area_of(&corners);
+            for p in &corners {
+                shell.bounds.add(p);
+            }
+        }
+        for users in self.joins.users.iter().filter(|u| u[1] == NONE) {
+            let shell = self.joins.shell_of[users[0] as usize / 3];
+            self.shells[shell as usize].open_sides += 1;
+        }
+    }
+
+    /// Checks the mesh and the rule of the sides: each has one user, or two that run oppositely.
+    ///
+    /// # Errors
+    ///
+    /// The first [`MeshFault`].
+    pub fn check(&self) -> Result<(), MeshFault> {
+        self.mesh.check()?;
+        let fault = |side: u32, rule| Err(MeshFault::BadSide { side: side as usize, rule });
+        let mut directions = vec![[0_u8; 2]; self.joins.ends.len()];
+        for (corners, sides) in self.mesh.triangles.iter().zip(&self.joins.sides) {
+            for (k, &side) in sides.iter().enumerate() {
+                let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                if side as usize >= self.joins.ends.len() || self.ends(side) != [a.min(b), a.max(b)]
+                {
+                    return fault(side, "its ends are those of its triangles");
+                }
+                let n = &mut directions[side as usize][usize::from(a > b)];
+                *n += 1;
+                if *n > 1 {
+                    return fault(side, "at most one triangle runs along it each way");
+                }
+            }
+        }
+        for (side, (n, users)) in (0..).zip(directions.iter().zip(&self.joins.users)) {
+            let n_users = n[0] + n[1];
+            if n_users != 1 + u8::from(users[1] != NONE) {
+                return fault(side, "its users are the triangles that name it");
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Joins {
+    fn mate(&self, half: u32) -> Option<u32> {
+        let side = self.sides[half as usize / 3][half as usize % 3];
+        let [first, second] = self.users[side as usize];
+        let other = if first == half { second } else { first };
+        (other != NONE).then_some(other)
+    }
+
+    /// Numbers the shells, and returns how many there are.
+    fn find_shells(&mut self) -> u32 {
+        let mut shell_of = vec![NONE; self.sides.len()];
         let mut stack = Vec::new();
         let mut n_shells = 0;
-        for start in 0..n_triangles as u32 {
+        for start in 0..shell_of.len() as u32 {
             if shell_of[start as usize] != NONE {
                 continue;
             }
@@ -248,59 +328,7 @@ impl Solid {
             n_shells += 1;
         }
         self.shell_of = shell_of;
-        self.shells = vec![Shell::empty(); n_shells as usize];
-        self.measure_shells();
-    }
-
-    fn measure_shells(&mut self) {
-        let origin = measure::local_origin(&self.mesh);
-        self.shells.iter_mut().for_each(|shell| *shell = Shell::empty());
-        for (t, &shell) in (0..).zip(&self.shell_of) {
-            let corners = self.mesh.corners(t);
-            let shell = &mut self.shells[shell as usize];
-            shell.first = shell.first.min(t);
-            shell.triangles += 1;
-            shell.volume_mm3 += measure::cone_volume(&origin, &corners);
-            shell.area_mm2 += measure::area_of(&corners);
-            for p in &corners {
-                shell.bounds.add(p);
-            }
-        }
-        for users in self.users.iter().filter(|u| u[1] == NONE) {
-            let shell = self.shell_of[users[0] as usize / 3];
-            self.shells[shell as usize].open_sides += 1;
-        }
-    }
-
-    /// Checks the mesh and the rule of the sides: each has one user, or two that run oppositely.
-    ///
-    /// # Errors
-    ///
-    /// The first [`MeshFault`].
-    pub fn check(&self) -> Result<(), MeshFault> {
-        self.mesh.check()?;
-        let fault = |side: u32, rule| Err(MeshFault::BadSide { side: side as usize, rule });
-        let mut directions = vec![[0_u8; 2]; self.ends.len()];
-        for (corners, sides) in self.mesh.triangles.iter().zip(&self.sides) {
-            for (k, &side) in sides.iter().enumerate() {
-                let (a, b) = (corners[k], corners[(k + 1) % 3]);
-                if side as usize >= self.ends.len() || self.ends(side) != [a.min(b), a.max(b)] {
-                    return fault(side, "its ends are those of its triangles");
-                }
-                let n = &mut directions[side as usize][usize::from(a > b)];
-                *n += 1;
-                if *n > 1 {
-                    return fault(side, "at most one triangle runs along it each way");
-                }
-            }
-        }
-        for (side, (n, users)) in (0..).zip(directions.iter().zip(&self.users)) {
-            let n_users = n[0] + n[1];
-            if n_users != 1 + u8::from(users[1] != NONE) {
-                return fault(side, "its users are the triangles that name it");
-            }
-        }
-        Ok(())
+        n_shells
     }
 }
 

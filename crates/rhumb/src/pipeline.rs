@@ -7,6 +7,7 @@
 use std::io::Write;
 use std::path::Path;
 
+use geom::bounding::Bounds;
 use machine::gcode::Emitter;
 use machine::program::Step;
 use mesh::health::{Health, solid_from_soup};
@@ -105,11 +106,11 @@ pub fn slice(
     drop(soup);
     let repair_ms = clock.lap();
     watch.progress.stage("orient", 1);
-    let placed = place(&solid, &request.wish, &job.orient)?;
+    let given = solid.mesh().bounds();
+    let placed = place(solid, &request.wish, &job.orient)?;
     let fit = check_envelope(&placed, job)?;
     let mut warnings: Vec<Warning> = health.notes.iter().map(warning).collect();
-    warnings.extend(placement_warnings(&solid, &placed, fit, job));
-    drop(solid);
+    warnings.extend(placement_warnings(&given, &placed, fit, job));
     let orient_ms = clock.lap();
 
     let (stages, mut layout) = stages(&placed.solid, job)?;
@@ -179,15 +180,15 @@ fn warning(note: &Note) -> Warning {
     Warning { code: note.code.to_owned(), message: note.message.clone() }
 }
 
-fn placement_warnings(solid: &Solid, placed: &Placed, fit: Fit, job: &Job) -> Vec<Warning> {
+/// What is odd about where the part lies, and where the model was: the box around it as given.
+fn placement_warnings(given: &Bounds, placed: &Placed, fit: Fit, job: &Job) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let mut warn = |code: &str, message: String| {
         warnings.push(Warning { code: code.to_owned(), message });
     };
     // A model that does not stand near the origin was made for another frame.
-    let before = solid.mesh().bounds();
-    let far = before.min.xy().coords.norm().max(before.max.xy().coords.norm());
-    if before.min.z.abs() > RECENTRED_MM || far > job.printer.rail.max {
+    let far = given.min.xy().coords.norm().max(given.max.xy().coords.norm());
+    if given.min.z.abs() > RECENTRED_MM || far > job.printer.rail.max {
         let shift = placed.placement.shift;
         warn(
             "Recentred",

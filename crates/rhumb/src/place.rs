@@ -102,12 +102,13 @@ pub struct Placed {
     pub reach: f64,
 }
 
-/// Lays a solid down and puts it in its place.
+/// Lays a solid down and puts it in its place. The solid is taken, so that a mesh of millions is
+/// not in memory twice.
 ///
 /// # Errors
 ///
 /// `Usage` for a rank that the list of candidates does not have.
-pub fn place(solid: &Solid, wish: &Wish, orient: &OrientParams) -> Result<Placed, Failure> {
+pub fn place(solid: Solid, wish: &Wish, orient: &OrientParams) -> Result<Placed, Failure> {
     let (rotation, rest) = match wish.pose {
         Pose::Flat => {
             let (rotation, rest) = rest(solid.mesh(), orient);
@@ -125,9 +126,13 @@ pub fn place(solid: &Solid, wish: &Wish, orient: &OrientParams) -> Result<Placed
         Pose::Turned([x, y, z]) => (Rotation3::from_euler_angles(x, y, z), None),
     };
     let mut placement = Placement::on_bed(solid.mesh(), &rotation);
-    let azimuth = whole_places(reference_azimuth(&placement.mesh(solid.mesh())));
-    placement.shift += Vector3::new(wish.centre.x, wish.centre.y, 0.0);
-    let solid = solid.moved(|p| placement.point(p));
+    let mut solid = solid.into_moved(|p| placement.point(p));
+    let azimuth = whole_places(reference_azimuth(solid.mesh()));
+    if wish.centre != Point2::origin() {
+        let aside = Vector3::new(wish.centre.x, wish.centre.y, 0.0);
+        placement.shift += aside;
+        solid = solid.into_moved(|p| p + aside);
+    }
     let reach = solid.mesh().vertices.iter().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
     Ok(Placed { solid, placement, rest, azimuth, reach })
 }
@@ -266,7 +271,7 @@ mod tests {
     }
 
     fn placed(mesh: Mesh, wish: &Wish) -> Placed {
-        place(&Solid::new(mesh), wish, &job().orient).unwrap()
+        place(Solid::new(mesh), wish, &job().orient).unwrap()
     }
 
     #[test]
@@ -278,7 +283,7 @@ mod tests {
         });
         assert_eq!(heights, [10.0, 20.0, 30.0]);
         let wish = Wish { pose: Pose::Ranked(7), ..Wish::default() };
-        let missing = place(&Solid::new(mesh), &wish, &job().orient).map(|_| ()).unwrap_err();
+        let missing = place(Solid::new(mesh), &wish, &job().orient).map(|_| ()).unwrap_err();
         assert_eq!(missing.class(), "Usage");
         assert!(missing.to_string().contains("6 ways"), "{missing}");
     }

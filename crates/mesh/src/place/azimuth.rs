@@ -17,11 +17,12 @@
 //! is higher on one side, still has one direction. A part that looks the same from everywhere
 //! after a k-th of a turn is indifferent to the choice.
 
+mod round;
+
 use super::footprint;
 use crate::measure;
 use crate::mesh::Mesh;
-use geom::circle::Circle;
-use nalgebra::Complex;
+use nalgebra::{Complex, Point3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -47,10 +48,16 @@ const CHUNK: usize = 1 << 14;
 #[must_use]
 pub fn reference_azimuth(mesh: &Mesh) -> f64 {
     let Some(surface) = Surface::of(mesh) else { return 0.0 };
-    let find = |n: usize, weight: Weight| lowest(&surface.harmonics(n, weight));
-    let found = find(LOW, Weight::Area)
-        .or_else(|| find(LOW, Weight::Height))
-        .or_else(|| find(HIGH, Weight::Area));
+    let low = |weight| surface.harmonics(LOW, weight);
+    // Most parts have the first, and a round one of millions of facets has none.
+    let first = lowest(&surface.harmonics(1, Weight::Area));
+    if first.is_none() && surface.is_surely_round() {
+        return 0.0;
+    }
+    let found = first
+        .or_else(|| lowest(&low(Weight::Area)))
+        .or_else(|| lowest(&low(Weight::Height)))
+        .or_else(|| lowest(&surface.harmonics(HIGH, Weight::Area)));
     let Some((k, harmonic)) = found else { return 0.0 };
     let directions = (0..k).map(|j| (harmonic.arg() + TAU * f64::from(j)) / f64::from(k));
     let turn = surface.choose(directions.collect()).rem_euclid(TAU);
@@ -70,12 +77,14 @@ enum Weight {
     Height,
 }
 
+/// A place in the complex plane, with the footprint as the unit circle, and a height from −1 to 1.
+type Place = (Complex<f64>, f64);
+
 /// A surface about the axis through the centre of its footprint.
 struct Surface<'a> {
     mesh: &'a Mesh,
-    circle: Circle,
-    middle: f64,
-    half_height: f64,
+    /// One for each vertex.
+    places: Vec<Place>,
 }
 
 impl<'a> Surface<'a> {
@@ -84,14 +93,17 @@ impl<'a> Surface<'a> {
         let bounds = mesh.bounds();
         let middle = nalgebra::center(&bounds.min, &bounds.max).z;
         let half_height = (bounds.size().z / 2.0).max(f64::MIN_POSITIVE);
-        Some(Self { mesh, circle, middle, half_height })
+        let place = |p: &Point3<f64>| {
+            let arm = (p.xy() - circle.centre) / circle.radius;
+            (Complex::new(arm.x, arm.y), (p.z - middle) / half_height)
+        };
+        Some(Self { mesh, places: mesh.vertices.par_iter().map(place).collect() })
     }
 
-    /// Place in the complex plane, with the footprint as the unit circle, and height.
-    fn place(&self, v: u32) -> (Complex<f64>, f64) {
-        let p = self.mesh.vertices[v as usize];
-        let arm = (p.xy() - self.circle.centre) / self.circle.radius;
-        (Complex::new(arm.x, arm.y), (p.z - self.middle) / self.half_height)
+    /// The places of the corners of a triangle, and its area.
+    fn triangle(&self, corners: &[u32; 3]) -> ([Place; 3], f64) {
+        let area = measure::area_of(&corners.map(|v| self.mesh.vertices[v as usize]));
+        (corners.map(|v| self.places[v as usize]), area)
     }
 
     /// The harmonics 1 … n.
@@ -100,9 +112,7 @@ impl<'a> Surface<'a> {
             let mut area = 0.0;
             let mut sums = vec![Complex::new(0.0, 0.0); n];
             for corners in triangles {
-                let positions = corners.map(|v| self.mesh.vertices[v as usize]);
-                let places = corners.map(|v| self.place(v));
-                let own = measure::area_of(&positions);
+                let (places, own) = self.triangle(corners);
                 area += own;
                 match weight {
                     Weight::Area => add_plain(&mut sums, places.map(|(z, _)| z), own),
@@ -116,6 +126,17 @@ impl<'a> Surface<'a> {
         let total = |k: usize| chunks.iter().map(|(_, sums)| sums[k]).sum::<Complex<f64>>();
         let share = if area > 0.0 { 1.0 / area } else { 0.0 };
         (0..n).map(|k| total(k) * share).collect()
+    }
+
+    /// Whether no harmonic that is looked at can be one to speak of. When this is not sure, which
+    /// takes no time to find out for small meshes, all of them are computed.
+    fn is_surely_round(&self) -> bool {
+        let mut sums = round::Sums::new();
+        for corners in &self.mesh.triangles {
+            let (places, area) = self.triangle(corners);
+            sums.add(&places, area);
+        }
+        sums.largest(LOW, HIGH) < LEAST
     }
 
     /// The direction that all low harmonics together prefer.

@@ -35,7 +35,7 @@ pub(super) fn run(arguments: &Orient, manner: &Manner) -> Result<u8, Failure> {
     let (solid, _) =
         solid_from_soup(&soup.scaled(wish.scale)).map_err(|e| failed(e.class(), e.to_string()))?;
     if let Some(target) = &arguments.output {
-        let placed = place(&solid, &wish, &job.orient)?;
+        let placed = place(solid.clone(), &wish, &job.orient)?;
         write_file(target, &[&arguments.model], &stl::write(placed.solid.mesh()))?;
     }
     let choices = choices(solid.mesh(), &job);
