@@ -48,19 +48,18 @@ const CHUNK: usize = 1 << 14;
 #[must_use]
 pub fn reference_azimuth(mesh: &Mesh) -> f64 {
     let Some(surface) = Surface::of(mesh) else { return 0.0 };
-    let low = |weight| surface.harmonics(LOW, weight);
-    // Most parts have the first, and a round one of millions of facets has none.
-    let first = lowest(&surface.harmonics(1, Weight::Area));
+    let by_area = surface.harmonics(LOW, Weight::Area);
+    let first = lowest(&by_area);
+    // A round part of millions of facets is known to be one in less time than this would take.
     if first.is_none() && surface.is_surely_round() {
         return 0.0;
     }
     let found = first
-        .or_else(|| lowest(&low(Weight::Area)))
-        .or_else(|| lowest(&low(Weight::Height)))
+        .or_else(|| lowest(&surface.harmonics(LOW, Weight::Height)))
         .or_else(|| lowest(&surface.harmonics(HIGH, Weight::Area)));
     let Some((k, harmonic)) = found else { return 0.0 };
     let directions = (0..k).map(|j| (harmonic.arg() + TAU * f64::from(j)) / f64::from(k));
-    let turn = surface.choose(directions.collect()).rem_euclid(TAU);
+    let turn = surface.choose(directions.collect(), by_area).rem_euclid(TAU);
     if turn > TAU / 2.0 { turn - TAU } else { turn }
 }
 
@@ -140,11 +139,11 @@ impl<'a> Surface<'a> {
     }
 
     /// The direction that all low harmonics together prefer.
-    fn choose(&self, directions: Vec<f64>) -> f64 {
+    fn choose(&self, directions: Vec<f64>, by_area: Vec<Complex<f64>>) -> f64 {
         if directions.len() == 1 {
             return directions[0];
         }
-        let families = [Weight::Area, Weight::Height].map(|weight| self.harmonics(LOW, weight));
+        let families = [by_area, self.harmonics(LOW, Weight::Height)];
         let mut best: Option<(f64, Complex<f64>)> = None;
         for azimuth in directions {
             let score = families.iter().map(|family| score(family, azimuth)).sum();
