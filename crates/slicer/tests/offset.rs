@@ -230,3 +230,67 @@ fn flat_charts_are_the_plane() {
         }
     }
 }
+
+/// Many places about the apex, each with whether a region holds it and how far its border is.
+fn places(chart: &Chart, shape: &Region, reach: f64) -> Vec<(Point2<f64>, bool, f64)> {
+    const HALF: i32 = 12;
+    let place = |k: i32| reach * f64::from(k) / f64::from(HALF) + 0.0017;
+    (-HALF..=HALF)
+        .flat_map(|i| (-HALF..=HALF).map(move |j| Point2::new(place(i), place(j))))
+        .map(|p| (p, shape.contains(&p), distance_to_border(chart, shape, &p)))
+        .collect()
+}
+
+#[test]
+fn offsets_know_the_apex() {
+    let circle = |x: f64, r: f64, n: u32| -> Region {
+        let point = |k: u32| {
+            let (sin, cos) = (f64::from(k) * TAU / f64::from(n)).sin_cos();
+            [x + r * cos, r * sin]
+        };
+        polygon(&(0..n).map(point).collect::<Vec<_>>())
+    };
+    let square = |x: f64, y: f64, half: f64| {
+        polygon(&[
+            [x - half, y - half],
+            [x + half, y - half],
+            [x + half, y + half],
+            [x - half, y + half],
+        ])
+    };
+    let shapes = [
+        ("disc at the apex", circle(0.0, 0.06, 48)),
+        ("larger disc at the apex", circle(0.0, 0.3, 48)),
+        ("disc beside the apex", circle(0.15, 0.4, 64)),
+        ("disc at the apex, not under it", circle(0.5, 0.45, 64)),
+        ("square", square(0.1, 0.05, 0.35)),
+        ("square beside", square(0.9, 0.1, 0.8)),
+        ("corner over the apex", square(0.95, 0.95, 1.0)),
+        ("side over the apex", square(0.0, 1.05, 1.1)),
+        ("frame", square(0.0, 0.0, 2.0).difference(&square(0.05, 0.1, 0.3))),
+        ("plate with a hole beside", square(0.0, 0.0, 2.0).difference(&circle(0.7, 0.5, 48))),
+    ];
+    for degrees in [10.0, 30.0, 45.0, 60.0_f64] {
+        let chart = Chart::cone(degrees.to_radians());
+        for (name, shape) in &shapes {
+            let places = places(&chart, shape, 1.2);
+            for distance in [0.1, 0.225, 0.45, 0.8] {
+                let (inset, outset) = (chart.inset(shape, distance), chart.outset(shape, distance));
+                inset.check();
+                outset.check();
+                for (p, is_inside, to_border) in &places {
+                    let is_near = *to_border <= distance;
+                    if (to_border - distance).abs() < 0.01 {
+                        continue;
+                    }
+                    let found = [inset.contains(p), outset.contains(p)];
+                    assert_eq!(
+                        found,
+                        [*is_inside && !is_near, *is_inside || is_near],
+                        "{name}, {degrees}°, {distance} mm: {p}, {to_border} mm from the border"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -10,6 +10,12 @@
 //! Newton's method on the two curves, or returns to the corner itself where a side is too short;
 //! elsewhere it follows the geodesic circle about the corner.
 //!
+//! On a cone a geodesic that passes the apex closely turns about it by more than half a turn of the
+//! chart, to either side. What lies behind the apex is thus reached from both sides, and the image of
+//! a side that comes nearer to the apex than the border is moved is torn there: the raw ring goes to
+//! the apex and back, so that it winds round every place as often as strips cover it. Ways back to a
+//! corner get a point abreast of the apex for the same reason.
+//!
 //! On a plane all of this is [`geom::offset`] itself, unchanged.
 
 use geom::grid::{GridPoint, mm, snap};
@@ -20,7 +26,7 @@ use geom::polyline::{distance_to_segment, share_nearest};
 use geom::region::{Fill, Region, Ring, signed_area};
 use nalgebra::{Point2, Vector2};
 
-use super::Chart;
+use super::{Chart, turned};
 
 impl Chart {
     /// Returns the points of the region at least `distance` (mm, not negative) from its border.
@@ -131,9 +137,17 @@ const SHARP: Curves = Curves { tolerance: OPENING_TOLERANCE_MM, longest_miter: L
 /// A grid step: what depends on it is as small.
 const AXIS_MM: f64 = 1e-5;
 
-/// Sides are never cut into pieces shorter than this, mm: beside the apex of a cone the image of a
-/// side jumps, and no number of points would follow it.
-const SHORTEST_PIECE_MM: f64 = 0.05;
+/// Sides are never cut into pieces shorter than this, mm: the image of such a piece lies within a
+/// few µm of its chord unless it passes the apex of a cone within a tenth of that.
+const SHORTEST_PIECE_MM: f64 = 0.02;
+
+/// Ways that may pass the apex of a cone are cut into so many pieces by the cosine of its angle: a
+/// chord that turned by half a turn would pass the apex on the wrong side, and longer ones would
+/// leave slivers between the strips of neighbouring sides.
+const WAY_PIECES: f64 = 8.0;
+
+/// How far a side near the apex may be from straight on the unrolled cone, mm.
+const BENT_SIDE_MM: f64 = 1e-3;
 
 /// Where sides turn by less than this sine, the crossing of their images is that of straight lines
 /// to within a fraction of a grid step.
@@ -145,17 +159,114 @@ const CROSSING_MM: f64 = 1e-6;
 /// Newton steps to a crossing; each gains two digits and more.
 const NEWTON_STEPS: usize = 6;
 
-/// One side of a ring in the chart, mm.
+/// One side of a ring, mm.
 struct Side {
     from: Point2<f64>,
+    /// Along its chord in the chart, of length 1.
     direction: Vector2<f64>,
+    /// Of its chord in the chart.
     length: f64,
+    /// For a side that is straight on the unrolled cone rather than in the chart: the way to its
+    /// end, in lengths (along the meridian of its begin, across it).
+    unrolled: Option<Vector2<f64>>,
 }
 
 impl Side {
-    fn at(&self, t: f64) -> Point2<f64> {
-        self.from + self.direction * t
+    fn new(from: Point2<f64>, to: Point2<f64>, unrolled: Option<Vector2<f64>>) -> Self {
+        let along = to - from;
+        let length = along.norm();
+        Self { from, direction: along / length, length, unrolled }
     }
+
+    /// The place `t` mm along the side, and the direction there in true lengths by chart mm.
+    fn at(&self, chart: &Chart, t: f64) -> (Point2<f64>, Vector2<f64>) {
+        if let (Some(way), Chart::Cone { cos }) = (self.unrolled, chart) {
+            let s = self.from.coords.norm();
+            let along = way / self.length;
+            let (x, y) = (s + along.x * t, along.y * t);
+            let turn = y.atan2(x);
+            let (sin, cosine) = turn.sin_cos();
+            let here =
+                Vector2::new(along.x * cosine + along.y * sin, along.y * cosine - along.x * sin);
+            return (turned(&(self.from.coords / s), x.hypot(y), turn / cos), here);
+        }
+        let p = off_axis(self.from + self.direction * t, &self.direction);
+        (p, chart.in_metric(&p, &self.direction))
+    }
+
+    /// Where the side is nearest to the axis, mm along it, and how far to its left the axis lies
+    /// there, true mm.
+    fn foot(&self) -> (f64, f64) {
+        match self.unrolled {
+            None => {
+                let left = Vector2::new(-self.direction.y, self.direction.x);
+                (-self.from.coords.dot(&self.direction), -left.dot(&self.from.coords))
+            }
+            Some(way) => {
+                let (s, length) = (self.from.coords.norm(), way.norm());
+                (-s * way.x / (length * length) * self.length, s * way.y / length)
+            }
+        }
+    }
+}
+
+/// The sides of a ring. Near the apex of a cone they are cut into pieces so short that they may as
+/// well be straight on the unrolled cone: what is straight in the chart is strongly bent there, and
+/// the ways from a bent side would cross each other.
+fn sides_of(chart: &Chart, ring: &[GridPoint], shift: f64) -> Vec<Side> {
+    let count = ring.len();
+    let Chart::Cone { cos } = *chart else {
+        return (0..count)
+            .map(|i| Side::new(mm(ring[i]), mm(ring[(i + 1) % count]), None))
+            .collect();
+    };
+    // A side that passes the apex at p has the curvature tan²/p.
+    let near = 2.0 * shift.abs() * (1.0 / (cos * cos) - 1.0).max(1.0);
+    let points: Vec<Point2<f64>> = (0..count)
+        .map(|i| {
+            let before = mm(ring[i]) - mm(ring[(i + count - 1) % count]);
+            off_axis(mm(ring[i]), &before.normalize())
+        })
+        .collect();
+    let mut sides = Vec::with_capacity(count);
+    for i in 0..count {
+        let (from, to) = (points[i], points[(i + 1) % count]);
+        let foot = share_nearest(&from, &to, &Point2::origin());
+        let nearest = from + (to - from) * foot;
+        if nearest.coords.norm() >= near {
+            sides.push(Side::new(from, to, None));
+        } else if foot > 0.0 && foot < 1.0 {
+            let nearest = off_axis(nearest, &(to - from).normalize());
+            cut_side(cos, (from, nearest), near, &mut sides);
+            cut_side(cos, (nearest, to), near, &mut sides);
+        } else {
+            cut_side(cos, (from, to), near, &mut sides);
+        }
+    }
+    sides
+}
+
+/// Appends the pieces of a side whose distance to the axis changes evenly.
+fn cut_side(cos: f64, (from, to): (Point2<f64>, Point2<f64>), near: f64, sides: &mut Vec<Side>) {
+    let (s, length) = (from.coords.norm(), (to - from).norm());
+    if s.min(to.coords.norm()) >= near || length <= AXIS_MM {
+        if length > 0.0 {
+            sides.push(Side::new(from, to, None));
+        }
+        return;
+    }
+    let turn = from.coords.perp(&to.coords).atan2(from.coords.dot(&to.coords)) * cos;
+    let end = Vector2::new(turn.cos(), turn.sin()) * to.coords.norm();
+    let way = end - Vector2::new(s, 0.0);
+    let side = Side::new(from, to, Some(way));
+    let (middle, _) = side.at(&Chart::Cone { cos }, length / 2.0);
+    if distance_to_segment(&from, &to, &middle) <= BENT_SIDE_MM {
+        sides.push(side);
+        return;
+    }
+    let middle = nalgebra::center(&from, &to);
+    cut_side(cos, (from, middle), near, sides);
+    cut_side(cos, (middle, to), near, sides);
 }
 
 /// What a raw ring does at a corner.
@@ -184,15 +295,8 @@ fn raw_ring(
     short_sides: ShortSides,
 ) -> Ring {
     let mover = Mover { chart, shift, curves };
-    let count = ring.len();
-    let sides: Vec<Side> = (0..count)
-        .map(|i| {
-            let (from, to) = (mm(ring[i]), mm(ring[(i + 1) % count]));
-            let along = to - from;
-            let length = along.norm();
-            Side { from, direction: along / length, length }
-        })
-        .collect();
+    let sides = sides_of(chart, ring, shift);
+    let count = sides.len();
     let before = |i: usize| &sides[(i + count - 1) % count];
     let turns: Vec<Turn> = (0..count).map(|i| mover.turn(before(i), &sides[i])).collect();
     let lengths: Vec<f64> = sides.iter().map(|side| side.length).collect();
@@ -200,34 +304,31 @@ fn raw_ring(
         turns.iter().map(|turn| mover.meet(turn).then_some(turn.consumed)).collect();
     let mut moved = MovedSides::new(&lengths, &lost);
     if short_sides == ShortSides::LeftOut {
-        moved.leave_out_short(|one, other| mover.crossing_of(&sides[one], &sides[other]));
+        moved.leave_out_short(|one, other| mover.crossing_across(&sides[one], &sides[other]));
     }
-    let places: Vec<(usize, Vec<Corner>)> = moved
-        .kept()
-        .map(|side| {
-            let both_fit = moved.fit_around(side);
-            if both_fit && moved.meets_across(side) {
-                let before = moved.before(side);
-                let at = sides[side].at(moved.from(side));
-                let corner = Corner {
-                    points: vec![mover.moved(&at, &sides[side])],
-                    before: sides[before].length - moved.to(before),
-                    after: moved.from(side),
-                };
-                return (side, vec![corner]);
-            }
-            let corner = |i: usize| mover.corner(before(i), &sides[i], &turns[i], both_fit);
-            (side, moved.corners(side).map(corner).collect())
-        })
-        .collect();
+    let corners_before = |side: usize| -> Vec<Corner> {
+        let both_fit = moved.fit_around(side);
+        if both_fit && moved.meets_across(side) {
+            let before = moved.before(side);
+            return vec![Corner {
+                points: vec![mover.moved(&sides[side], moved.from(side))],
+                before: sides[before].length - moved.to(before),
+                after: moved.from(side),
+            }];
+        }
+        let corner = |i: usize| mover.corner(before(i), &sides[i], &turns[i], both_fit);
+        moved.corners(side).map(corner).collect()
+    };
+    let places: Vec<(&Side, Vec<Corner>)> =
+        moved.kept().map(|side| (&sides[side], corners_before(side))).collect();
     let mut raw = Ring::with_capacity(count + count / 4);
     for (k, (side, corners)) in places.iter().enumerate() {
         raw.extend(corners.iter().flat_map(|corner| &corner.points).map(snap));
         let (_, next) = &places[(k + 1) % places.len()];
         let (Some(here), Some(next)) = (corners.last(), next.first()) else { continue };
         let (Some(from), Some(to)) = (here.points.last(), next.points.first()) else { continue };
-        let range = (here.after, sides[*side].length - next.before);
-        mover.along(&sides[*side], range, (from, to), &mut raw);
+        let range = (here.after, side.length - next.before);
+        mover.side(side, range, (from, to), &mut raw);
     }
     raw
 }
@@ -245,8 +346,8 @@ struct Turn {
 
 impl Mover<'_> {
     fn turn(&self, before: &Side, after: &Side) -> Turn {
-        let at = off_axis(after.from, &before.direction);
-        let [b, a] = [before, after].map(|side| self.chart.in_metric(&at, &side.direction));
+        let (_, b) = before.at(self.chart, before.length);
+        let (at, a) = after.at(self.chart, 0.0);
         let (b_speed, a_speed) = (b.norm(), a.norm());
         let (b, a) = (b / b_speed, a / a_speed);
         let (cos, sin) = (b.dot(&a), b.perp(&a));
@@ -255,55 +356,115 @@ impl Mover<'_> {
         Turn { at, normals, cos, sin, consumed: [lost / b_speed, lost / a_speed] }
     }
 
+    fn tolerance(&self) -> f64 {
+        self.curves.tolerance.min(self.shift.abs() / 2.0)
+    }
+
     /// Whether the sides at a corner end at their crossing: they run into each other, or it is near
     /// enough to the arc, or wanted sharp. It lies |shift|/cos(turn/2) from the corner.
     fn meet(&self, turn: &Turn) -> bool {
         let radius = self.shift.abs();
-        let tolerance = self.curves.tolerance.min(radius / 2.0);
         let cos_half = f64::midpoint(1.0, turn.cos).max(0.0).sqrt();
-        turn.sin * self.shift > 0.0
-            || radius * (1.0 - cos_half) <= tolerance * cos_half
+        if turn.sin * self.shift > 0.0 {
+            // With the apex between corner and crossing, the two images pass it on either side.
+            return !self.has_apex() || turn.at.coords.norm() * cos_half > radius;
+        }
+        radius * (1.0 - cos_half) <= self.tolerance() * cos_half
             || cos_half * self.curves.longest_miter >= 1.0
     }
 
     fn corner(&self, before: &Side, after: &Side, turn: &Turn, sides_fit: bool) -> Corner {
         let apart = |points| Corner { points, before: 0.0, after: 0.0 };
-        let ends = || turn.normals.map(|normal| self.walk(&turn.at, &(normal * self.shift)));
+        let meet = self.meet(turn);
         if turn.sin * self.shift > 0.0 {
-            if sides_fit && let Some(corner) = self.crossing(before, after, turn) {
+            if sides_fit
+                && meet
+                && let Some(corner) = self.crossing(before, after, turn)
+            {
                 return corner;
             }
-            let [end, begin] = ends();
-            return apart(vec![end, turn.at, begin]);
+            let [mut points, begin] = turn.normals.map(|normal| self.way(&turn.at, &normal));
+            points.reverse();
+            points.push(turn.at);
+            points.extend(begin);
+            return apart(points);
         }
-        if self.meet(turn)
-            && let Some(corner) = self.crossing(before, after, turn)
-        {
+        if meet && let Some(corner) = self.crossing(before, after, turn) {
             return corner;
         }
-        let radius = self.shift.abs();
-        let tolerance = self.curves.tolerance.min(radius / 2.0);
+        apart(self.arc(turn))
+    }
+
+    /// The geodesic circle about a corner, from the image of the side before to that of the side
+    /// after.
+    fn arc(&self, turn: &Turn) -> Vec<Point2<f64>> {
         let angle = turn.sin.atan2(turn.cos);
-        let largest_step = 2.0 * (1.0 - tolerance / radius).acos();
+        let largest_step = 2.0 * (1.0 - self.tolerance() / self.shift.abs()).acos();
         let pieces = (angle.abs() / largest_step).ceil().max(1.0);
-        let [end, begin] = ends();
-        let mut points = vec![end];
-        for k in 1..pieces as u32 {
+        let [first, last] = turn.normals;
+        let spoke = |k: u32| {
+            if k == pieces as u32 {
+                return last * self.shift;
+            }
             let (sin, cos) = (angle * f64::from(k) / pieces).sin_cos();
-            let [normal, _] = turn.normals;
-            let spoke =
-                Vector2::new(normal.x * cos - normal.y * sin, normal.x * sin + normal.y * cos);
-            points.push(self.walk(&turn.at, &(spoke * self.shift)));
+            Vector2::new(first.x * cos - first.y * sin, first.x * sin + first.y * cos) * self.shift
+        };
+        let s = turn.at.coords.norm();
+        let mut points = vec![self.walk(&turn.at, &spoke(0))];
+        for k in 1..=pieces as u32 {
+            let (old, new) = (spoke(k - 1), spoke(k));
+            let passes_behind = s + new.x < 0.0 && old.y * new.y < 0.0;
+            if passes_behind && self.has_apex() {
+                points.extend(self.tear(&(turn.at.coords / s), s, old.y.signum()));
+            }
+            points.push(self.walk(&turn.at, &new));
         }
-        points.push(begin);
-        apart(points)
+        points
+    }
+
+    fn has_apex(&self) -> bool {
+        matches!(self.chart, Chart::Cone { .. })
+    }
+
+    /// The tear of an image that passes behind the apex of a cone, seen from radius `s` on the
+    /// meridian `outwards`: the place straight behind the apex as it is reached from one side
+    /// (`side` is the sign of the turn), the apex, and the place as it is reached from the other.
+    fn tear(&self, outwards: &Vector2<f64>, s: f64, side: f64) -> [Point2<f64>; 3] {
+        // On the branch cut of the turn; zeros have signs.
+        let behind = |side: f64| Vector2::new(-self.shift.abs(), 0.0_f64.copysign(side));
+        let image = |side| self.chart.walk_along(s, outwards, &behind(side));
+        [image(side), Point2::origin(), image(-side)]
+    }
+
+    /// The way from a point to its image along `normal`, without the point. Near the apex of a cone
+    /// all ways are cut into as many pieces, which turn equally far about the apex, so that ways
+    /// that differ a little stay side by side.
+    fn way(&self, from: &Point2<f64>, normal: &Vector2<f64>) -> Vec<Point2<f64>> {
+        let (s, step) = (from.coords.norm(), normal * self.shift);
+        let pieces = match *self.chart {
+            Chart::Cone { cos } if s < 2.0 * self.shift.abs() => (WAY_PIECES / cos).ceil(),
+            _ => 1.0,
+        };
+        let turn = step.y.atan2(s + step.x);
+        let mut way: Vec<Point2<f64>> = (1..pieces as u32)
+            .map(|k| {
+                // Where the straight way of the unrolled cone has turned by this much.
+                let (sin, cos) = (turn * f64::from(k) / pieces).sin_cos();
+                let ahead = step.y * cos - step.x * sin;
+                let share = if ahead == 0.0 { f64::from(k) / pieces } else { s * sin / ahead };
+                self.walk(from, &(step * share))
+            })
+            .collect();
+        way.push(self.walk(from, &step));
+        way
     }
 
     /// The crossing of the images of two sides, produced beyond the corner where they drift apart;
     /// `None` when they do not meet nearby.
     fn crossing(&self, before: &Side, after: &Side, turn: &Turn) -> Option<Corner> {
         let half = self.shift / (1.0 + turn.cos);
-        if turn.sin.abs() <= SMALL_TURN && turn.cos > 0.0 {
+        let is_clear = !self.has_apex() || turn.at.coords.norm() > self.shift.abs();
+        if turn.sin.abs() <= SMALL_TURN && turn.cos > 0.0 && is_clear {
             let at = self.walk(&turn.at, &((turn.normals[0] + turn.normals[1]) * half));
             let [before, after] = turn.consumed;
             return Some(Corner { points: vec![at], before, after });
@@ -317,14 +478,15 @@ impl Mover<'_> {
         Some(Corner { points: vec![at], before: before.length - to, after: from })
     }
 
-    /// Where the images of two sides that are not neighbours run into each other, as lengths on
-    /// either side.
-    fn crossing_of(&self, one: &Side, other: &Side) -> Option<[f64; 2]> {
+    /// Where the images of two sides that are not neighbours run into each other, mm along either;
+    /// `None` where they are nearly parallel or the apex of a cone is near.
+    fn crossing_across(&self, one: &Side, other: &Side) -> Option<[f64; 2]> {
         let sine = one.direction.perp(&other.direction) * self.shift.signum();
-        if sine < LEAST_SINE {
+        let is_near_apex = |side: &Side| side.from.coords.norm() < 2.0 * self.shift.abs();
+        if sine < LEAST_SINE || (self.has_apex() && (is_near_apex(one) || is_near_apex(other))) {
             return None;
         }
-        self.newton(one, other, [one.length, 0.0]).map(|(lengths, _)| lengths)
+        self.newton(one, other, [one.length, 0.0]).map(|(places, _)| places)
     }
 
     /// The crossing of the images of two sides and its places on them, from a guess of these;
@@ -337,8 +499,8 @@ impl Mover<'_> {
     ) -> Option<([f64; 2], Point2<f64>)> {
         let cross = one.direction.perp(&other.direction);
         for _ in 0..NEWTON_STEPS {
-            let end = self.moved(&one.at(to), one);
-            let begin = self.moved(&other.at(from), other);
+            let end = self.moved(one, to);
+            let begin = self.moved(other, from);
             let gap = end - begin;
             if gap.norm() <= CROSSING_MM {
                 return Some(([to, from], end));
@@ -355,6 +517,32 @@ impl Mover<'_> {
 
     /// Appends points of the image of a side between two places on it, chart mm from its begin,
     /// whose own images are known.
+    fn side(
+        &self,
+        side: &Side,
+        (from, to): (f64, f64),
+        (begin, end): (&Point2<f64>, &Point2<f64>),
+        raw: &mut Ring,
+    ) {
+        let (foot, left_gap) = side.foot();
+        // Positive where the side moves towards the axis.
+        let gap = left_gap * self.shift.signum();
+        let is_torn =
+            self.has_apex() && (from..to).contains(&foot) && gap > 0.0 && gap < self.shift.abs();
+        if !is_torn {
+            self.along(side, (from, to), (begin, end), raw);
+            return;
+        }
+        // Before the foot the apex lies ahead, and the way to the left passes it clockwise.
+        let (nearest, _) = side.at(self.chart, foot);
+        let outwards = nearest.coords.normalize();
+        let tear = self.tear(&outwards, gap, -self.shift.signum());
+        self.along(side, (from, foot), (begin, &tear[0]), raw);
+        raw.extend(tear.iter().map(snap));
+        self.along(side, (foot, to), (&tear[2], end), raw);
+    }
+
+    /// As [`side`](Self::side), for a part of it whose image is not torn.
     fn along(
         &self,
         side: &Side,
@@ -362,8 +550,9 @@ impl Mover<'_> {
         ends: (&Point2<f64>, &Point2<f64>),
         raw: &mut Ring,
     ) {
-        let foot = share_nearest(&side.at(from), &side.at(to), &Point2::origin());
-        let nearest = side.at(from + (to - from) * foot).coords.norm();
+        let at = |t: f64| side.from + side.direction * t;
+        let foot = share_nearest(&at(from), &at(to), &Point2::origin());
+        let nearest = at(from + (to - from) * foot).coords.norm();
         let bend = self.chart.bending(nearest) * (to - from).powi(2) * self.shift.abs();
         if to - from <= SHORTEST_PIECE_MM || bend <= self.curves.tolerance {
             return;
@@ -371,7 +560,7 @@ impl Mover<'_> {
         // The image bends most where the side is nearest to the axis.
         let foot = if (0.05..0.95).contains(&foot) { foot } else { 0.5 };
         let middle = from + (to - from) * foot;
-        let image = self.moved(&side.at(middle), side);
+        let image = self.moved(side, middle);
         if distance_to_segment(ends.0, ends.1, &image) <= self.curves.tolerance / 2.0 {
             return;
         }
@@ -380,10 +569,9 @@ impl Mover<'_> {
         self.along(side, (middle, to), (&image, ends.1), raw);
     }
 
-    /// The image of a point of a side.
-    fn moved(&self, p: &Point2<f64>, side: &Side) -> Point2<f64> {
-        let p = off_axis(*p, &side.direction);
-        let along = self.chart.in_metric(&p, &side.direction);
+    /// The image of the place `t` mm along a side.
+    fn moved(&self, side: &Side, t: f64) -> Point2<f64> {
+        let (p, along) = side.at(self.chart, t);
         let normal = Vector2::new(-along.y, along.x) * (self.shift / along.norm());
         self.walk(&p, &normal)
     }
