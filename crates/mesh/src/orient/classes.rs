@@ -1,18 +1,22 @@
 //! Gathers facets by direction, whichever way they face.
 //!
 //! 1. Unit normals are folded to one half of the sphere and rounded to cells of the size that the
-//!    tolerance spans; facets are sorted by cell.
+//!    tolerance spans; facets are brought together by cell, in a few counting passes.
 //! 2. The cells with the most area in themselves and their neighbours are where classes may be;
 //!    from each, the mean direction of the facets within the tolerance is followed to where it
 //!    rests. Neighbours are looked up on both sides of the fold.
 //! 3. Of directions closer than half the tolerance, the one with more area stays.
 //!
 //! A class may hold its area in a few large facets or in thousands of small noisy ones: the cost
-//! is one sort of the facets either way.
+//! is the same few passes over the facets either way. A cell that lies within the tolerance of a
+//! direction as a whole, or beyond it, is added or left out as a whole, so that a flat face of a
+//! million facets is not walked once for each direction near it.
 
 use crate::mesh::Mesh;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::OnceLock;
 
 /// Cells whose surroundings are measured: those with the most area of their own. A class with a
 /// twentieth of the area spreads over a dozen cells, so one of them is among the first 250.
@@ -40,7 +44,8 @@ impl Faces {
         let (mut normals, mut areas_mm2) = (Vec::new(), Vec::new());
         let facets = (0..n).into_par_iter().map(|t| {
             let twice = mesh.area_vector(t);
-            (twice.try_normalize(0.0).unwrap_or_default(), twice.norm() / 2.0)
+            let length = twice.norm();
+            (if length > 0.0 { twice / length } else { Vector3::zeros() }, length / 2.0)
         });
         facets.unzip_into_vecs(&mut normals, &mut areas_mm2);
         let total_mm2 = areas_mm2.iter().sum();
@@ -75,55 +80,87 @@ pub(super) fn classes(faces: &Faces, tolerance_rad: f64) -> Vec<Class> {
 
 /// The facets by the cell of their direction.
 struct Grid {
-    cosine: f64,
+    tolerance: Reach,
     cell_size: f64,
-    /// Facets, sorted by cell.
+    /// Facets, sorted by cell, ascending within a cell.
     facets: Vec<u32>,
-    /// Cells, ascending, with where their facets begin and end.
-    cells: Vec<(Key, std::ops::Range<usize>)>,
+    /// Cells, ascending.
+    cells: Vec<Cell>,
 }
 
-/// The place of a cell, its three coordinates in one number: a mesh of millions is sorted by it.
-type Key = u64;
+/// How far directions may be apart.
+#[derive(Clone, Copy)]
+struct Reach {
+    cosine: f64,
+    /// The distance between the ends of two unit vectors that are so far apart.
+    chord: f64,
+}
 
-/// The key of facets without a direction; they come last.
-const NOWHERE: Key = Key::MAX;
+/// Facets whose directions are near each other.
+struct Cell {
+    key: Key,
+    /// Where they are in [`Grid::facets`].
+    facets: Range<usize>,
+    /// Asked of a cell when a direction comes near it.
+    whole: OnceLock<Whole>,
+}
+
+/// All facets of a cell together, folded as the cell is.
+#[derive(Clone, Copy)]
+struct Whole {
+    /// Sum of normal by area, and of area.
+    sum: Vector3<f64>,
+    area: f64,
+    /// The direction of the sum, and the distance of the farthest normal from it.
+    middle: Vector3<f64>,
+    spread: f64,
+}
+
+/// The place of a cell, its three coordinates in one number.
+type Key = u32;
+
+/// Cells are no smaller than this share of the unit sphere's radius: so many have numbers of 32
+/// bits. Tolerances below 0.08° are served by larger cells.
+const LEAST_CELL: f64 = 1.0 / 700.0;
+
+/// Distances of directions that differ by less may be rounding.
+const SAME_CHORD: f64 = 1e-9;
 
 impl Grid {
     fn new(faces: &Faces, tolerance_rad: f64) -> Self {
-        let cell_size = 2.0 * (tolerance_rad / 2.0).sin();
+        let chord = 2.0 * (tolerance_rad / 2.0).sin();
+        let cell_size = chord.max(LEAST_CELL);
+        let lattice = Lattice::of(cell_size);
         let normals = faces.normals.par_iter().zip(0_u32..faces.normals.len() as u32);
-        let mut keyed: Vec<(Key, u32)> = normals
-            .map(|(normal, t)| match *normal == Vector3::zeros() {
-                true => (NOWHERE, t),
-                false => (key(place(&folded(normal), cell_size)), t),
-            })
+        let keyed = normals
+            .filter(|(normal, _)| **normal != Vector3::zeros())
+            .map(|(normal, t)| pack(lattice.key(place(&folded(normal), cell_size)), t))
             .collect();
-        keyed.par_sort_unstable();
-        keyed.truncate(keyed.partition_point(|(key, _)| *key != NOWHERE));
+        let keyed = sorted(keyed, lattice);
         let mut cells = Vec::new();
         let mut start = 0;
-        for run in keyed.chunk_by(|a, b| a.0 == b.0) {
-            cells.push((run[0].0, start..start + run.len()));
-            start += run.len();
+        for run in keyed.chunk_by(|a, b| a >> 32 == b >> 32) {
+            let facets = start..start + run.len();
+            start = facets.end;
+            cells.push(Cell { key: (run[0] >> 32) as Key, facets, whole: OnceLock::new() });
         }
-        let facets = keyed.into_iter().map(|(_, t)| t).collect();
-        Self { cosine: tolerance_rad.cos(), cell_size, facets, cells }
+        let facets = keyed.into_iter().map(|entry| entry as u32).collect();
+        Self { tolerance: Reach { cosine: tolerance_rad.cos(), chord }, cell_size, facets, cells }
     }
 
     /// Directions near which classes may be, the most promising first.
     fn seeds(&self, faces: &Faces) -> Vec<Vector3<f64>> {
-        let area = |cell: &std::ops::Range<usize>| -> f64 {
-            self.facets[cell.clone()].iter().map(|t| faces.areas_mm2[*t as usize]).sum()
+        let area = |cell: &Cell| -> f64 {
+            self.facets[cell.facets.clone()].iter().map(|t| faces.areas_mm2[*t as usize]).sum()
         };
-        let areas: Vec<f64> = self.cells.par_iter().map(|(_, cell)| area(cell)).collect();
+        let areas: Vec<f64> = self.cells.par_iter().map(area).collect();
         let mut order: Vec<usize> = (0..self.cells.len()).collect();
         order.sort_by(|a, b| areas[*b].total_cmp(&areas[*a]).then(a.cmp(b)));
         order.truncate(MOST_CELLS);
         let mut seeds: Vec<(f64, Vector3<f64>)> = order
-            .into_iter()
+            .into_par_iter()
             .map(|i| {
-                let mean = self.mean(faces, self.cells[i].1.clone(), &Vector3::zeros(), -1.0).0;
+                let mean = self.whole(faces, &self.cells[i]).sum;
                 let around = self.around(&mean).iter().map(|j| areas[*j]).sum();
                 (around, mean)
             })
@@ -134,62 +171,83 @@ impl Grid {
 
     /// Follows the mean direction of the facets around.
     fn refine(&self, faces: &Faces, seed: Vector3<f64>) -> Class {
-        let mut direction = seed;
+        let mut direction = seed.try_normalize(0.0).unwrap_or(seed);
         for _ in 0..REFINEMENTS {
-            direction = self.sum(faces, &direction).0;
+            let (mean, area_mm2) = self.sum(faces, &direction);
+            if mean == direction {
+                return Class { direction, area_mm2 };
+            }
+            direction = mean;
         }
         Class { direction, area_mm2: self.sum(faces, &direction).1 }
     }
 
-    /// Mean direction and area of the facets within the tolerance of a direction.
+    /// Mean direction and area of the facets within the tolerance of a direction of length 1.
     fn sum(&self, faces: &Faces, direction: &Vector3<f64>) -> (Vector3<f64>, f64) {
         let mut sum = Vector3::zeros();
         let mut area = 0.0;
         for i in self.around(direction) {
-            let (mean, a) = self.mean(faces, self.cells[i].1.clone(), direction, self.cosine);
+            let (mean, a) = self.near(faces, &self.cells[i], direction);
             sum += mean;
             area += a;
         }
         (sum.try_normalize(0.0).unwrap_or(*direction), area)
     }
 
-    /// Sum of normal by area, and of area, of the facets of a cell whose normals, folded towards
-    /// `direction`, reach `cosine`. Without a direction the cell's own fold is used.
-    fn mean(
-        &self,
-        faces: &Faces,
-        cell: std::ops::Range<usize>,
-        direction: &Vector3<f64>,
-        cosine: f64,
-    ) -> (Vector3<f64>, f64) {
+    /// Sum of normal by area, and of area, of the facets of a cell within the tolerance of a
+    /// direction or its opposite, folded towards it.
+    fn near(&self, faces: &Faces, cell: &Cell, direction: &Vector3<f64>) -> (Vector3<f64>, f64) {
+        let whole = self.whole(faces, cell);
+        let way = if whole.middle.dot(direction) < 0.0 { -1.0 } else { 1.0 };
+        let apart = (whole.middle * way - direction).norm();
+        if apart + whole.spread < self.tolerance.chord - SAME_CHORD {
+            return (whole.sum * way, whole.area);
+        }
+        if apart - whole.spread > self.tolerance.chord + SAME_CHORD {
+            return (Vector3::zeros(), 0.0);
+        }
         let mut sum = Vector3::zeros();
         let mut area = 0.0;
-        for &t in &self.facets[cell] {
+        for &t in &self.facets[cell.facets.clone()] {
             let (normal, a) = (faces.normals[t as usize], faces.areas_mm2[t as usize]);
             let along = normal.dot(direction);
-            if along.abs() >= cosine {
-                let normal = match along {
-                    0.0 => folded(&normal),
-                    _ if along < 0.0 => -normal,
-                    _ => normal,
-                };
-                sum += normal * a;
+            if along.abs() >= self.tolerance.cosine {
+                sum += normal * a.copysign(along);
                 area += a;
             }
         }
         (sum, area)
     }
 
+    fn whole(&self, faces: &Faces, cell: &Cell) -> Whole {
+        *cell.whole.get_or_init(|| {
+            let facets = &self.facets[cell.facets.clone()];
+            let normal = |t: &u32| folded(&faces.normals[*t as usize]);
+            let mut sum = Vector3::zeros();
+            let mut area = 0.0;
+            for t in facets {
+                let a = faces.areas_mm2[*t as usize];
+                sum += normal(t) * a;
+                area += a;
+            }
+            let middle = sum.try_normalize(0.0).unwrap_or_default();
+            let apart = |t: &u32| (normal(t) - middle).norm_squared();
+            let spread = facets.iter().map(apart).fold(0.0, f64::max).sqrt();
+            Whole { sum, area, middle, spread }
+        })
+    }
+
     /// The cells around a direction and its opposite, ascending.
     fn around(&self, direction: &Vector3<f64>) -> Vec<usize> {
+        let lattice = Lattice::of(self.cell_size);
         let length = direction.norm();
         let mut cells = Vec::with_capacity(54);
         for way in [1.0, -1.0] {
             let centre = place(&(direction * (way / length)), self.cell_size);
             for i in 0..27 {
                 let offset = [i / 3 / 3 - 1, i / 3 % 3 - 1, i % 3 - 1];
-                let near = key([0, 1, 2].map(|k| centre[k] + offset[k]));
-                cells.extend(self.cells.binary_search_by_key(&near, |cell| cell.0));
+                let near = lattice.key([0, 1, 2].map(|k| centre[k] + offset[k]));
+                cells.extend(self.cells.binary_search_by_key(&near, |cell| cell.key));
             }
         }
         cells.sort_unstable();
@@ -200,17 +258,59 @@ impl Grid {
 
 /// The coordinates of the cell of a direction.
 fn place(direction: &Vector3<f64>, cell_size: f64) -> [i32; 3] {
-    // Tolerances are some ten-thousandths at least; coordinates must fit a third of a key.
-    let farthest = f64::from(HALF - 2);
-    [0, 1, 2].map(|k| (direction[k] / cell_size).round().clamp(-farthest, farthest) as i32)
+    [0, 1, 2].map(|k| (direction[k] / cell_size).round() as i32)
 }
 
-/// Half the range of a coordinate in a key.
-const HALF: i32 = 1 << 20;
+/// The coordinates that cells have: from `-half` to `half`, with one to spare for neighbours.
+#[derive(Clone, Copy)]
+struct Lattice {
+    half: i32,
+}
 
-/// Keys have the order of the coordinates.
-fn key(place: [i32; 3]) -> Key {
-    place.into_iter().fold(0, |key, k| key << 21 | u64::from((k + HALF) as u32))
+impl Lattice {
+    fn of(cell_size: f64) -> Self {
+        Self { half: (1.0 / cell_size).round() as i32 + 1 }
+    }
+
+    fn count(self) -> u32 {
+        2 * self.half as u32 + 1
+    }
+
+    /// Keys have the order of the coordinates.
+    fn key(self, place: [i32; 3]) -> Key {
+        place.into_iter().fold(0, |key, k| key * self.count() + (k + self.half) as u32)
+    }
+}
+
+/// A key and a facet in one number.
+fn pack(key: Key, facet: u32) -> u64 {
+    u64::from(key) << 32 | u64::from(facet)
+}
+
+/// Sorts by key; facets of one key keep their order. A counting sort for each coordinate, the last
+/// first (D. Knuth, TAOCP vol. 3, section 5.2.5).
+fn sorted(entries: Vec<u64>, lattice: Lattice) -> Vec<u64> {
+    let mut entries = entries;
+    let mut other = vec![0; entries.len()];
+    let n = lattice.count();
+    for unit in [1, n, n * n] {
+        let coordinate = |entry: u64| ((entry >> 32) as Key / unit % n) as usize;
+        let mut next = vec![0_usize; n as usize];
+        for &entry in &entries {
+            next[coordinate(entry)] += 1;
+        }
+        let mut start = 0;
+        for slot in &mut next {
+            start += std::mem::replace(slot, start);
+        }
+        for &entry in &entries {
+            let slot = &mut next[coordinate(entry)];
+            other[*slot] = entry;
+            *slot += 1;
+        }
+        std::mem::swap(&mut entries, &mut other);
+    }
+    entries
 }
 
 /// The one of a direction and its opposite with z > 0, or y > 0, or x > 0.
