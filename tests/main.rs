@@ -24,6 +24,7 @@ mod shared;
 mod slice;
 mod text;
 mod threads;
+mod thumbnail;
 mod verify;
 mod volume;
 mod walls;

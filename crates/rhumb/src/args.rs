@@ -451,18 +451,43 @@ pub struct Verify {
 pub struct Preview {
     /// The program
     pub program: PathBuf,
-    /// Where the picture goes
-    #[arg(short, long, value_name = "FILE.svg")]
+    /// Where the picture goes: a page to turn and play (html), the deposit (png), lines (svg)
+    #[arg(short, long, value_name = "FILE.html|png|svg")]
     pub output: PathBuf,
-    /// Draw one layer from above, counted from 0, instead of the whole print
-    #[arg(long, value_name = "K")]
+    /// Draw one layer from above, counted from 0, instead of the whole print (svg)
+    #[arg(long, value_name = "K", conflicts_with = "plot")]
     pub layer: Option<usize>,
-    /// What the colours of the whole print mean
+    /// Draw a plot instead: bed speed, carriage speed and flow over time, or the heights of layers
+    /// against the flat faces of --model (svg)
+    #[arg(long, value_enum, value_name = "motion|schedule")]
+    pub plot: Option<Plot>,
+    /// The mesh as it was sliced (see `slice --export-placed`), for its flat faces and for findings
+    #[arg(long, value_name = "PLACED.stl")]
+    pub model: Option<PathBuf>,
+    /// What the colours of the whole print mean (png, svg)
     #[arg(long, value_enum, default_value_t = Coloring::Role)]
     pub color_by: Coloring,
+    /// Azimuth of the eye about the part, degrees from x towards y (png)
+    #[arg(long, value_name = "DEG", default_value_t = -60.0, allow_hyphen_values = true)]
+    pub azimuth: f64,
+    /// Elevation of the eye above the bed, degrees (png)
+    #[arg(long, value_name = "DEG", default_value_t = 30.0, allow_hyphen_values = true)]
+    pub elevation: f64,
+    /// Size of the picture, pixels (png)
+    #[arg(long, value_name = "WxH", default_value = "1200x900")]
+    pub size: String,
     /// Which settings to use; the dialect is the one that the program names
     #[command(flatten)]
     pub settings: SettingsArguments,
+}
+
+/// What is plotted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Plot {
+    /// Speeds and flow over time.
+    Motion,
+    /// Heights of layers and flat faces.
+    Schedule,
 }
 
 /// What colours mean.

@@ -32,6 +32,7 @@
 //! ```
 
 pub mod args;
+pub mod base64;
 pub mod calibration;
 pub mod check;
 pub mod clock;
@@ -44,6 +45,7 @@ pub mod interrupt;
 pub mod levels;
 pub mod output;
 pub mod overhang;
+pub mod page;
 pub mod pipeline;
 pub mod place;
 pub mod program_text;

@@ -21,6 +21,7 @@ use slicer::layer::Filled;
 use slicer::level::Level;
 use slicer::section::Tears;
 use slicer::toolpath::LostArea;
+use twin::picture::thumbnail::Thumbnail;
 
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
@@ -127,7 +128,10 @@ pub fn slice(
     let mut job = job.clone();
     job.plan.resample.azimuth = placed.azimuth;
     let mut text = Emitter::for_printer(out, job.dialect, &job.printer);
-    program_text::head(&mut text, request.name, request.made_at, &job.start).map_err(written)?;
+    // On a bed that turns no side is the front: the picture is that of the upright part, too.
+    let thumbnail = Thumbnail::draw(upright.mesh());
+    program_text::head(&mut text, request.name, request.made_at, &thumbnail, &job.start)
+        .map_err(written)?;
     let mut printed = layers(&upright, &stages, &job, &mut text, watch)?;
     layout.levels = std::mem::take(&mut printed.levels);
     program_text::tail(

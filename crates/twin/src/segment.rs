@@ -23,6 +23,9 @@ pub enum Kind {
     Still,
 }
 
+/// Pieces of one path, at most: some turns of the bed.
+const MOST_PIECES: u32 = 256;
+
 /// One motion line. Frames and units as in the [crate].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
@@ -86,6 +89,26 @@ impl Segment {
     #[must_use]
     pub fn extrudes(&self) -> bool {
         self.path > 0.0 && self.filament > 0.0
+    }
+
+    /// Returns the ends of straight pieces that stay within about `tolerance` (mm) of the path, in
+    /// the part. One, of a straight path.
+    pub fn pieces(
+        &self,
+        alignment: &Alignment,
+        tolerance: f64,
+    ) -> impl Iterator<Item = Point3<f64>> + use<> {
+        let bow = self.curve.deviation_bound() / tolerance;
+        let count = (bow.sqrt().ceil() as u32).clamp(1, MOST_PIECES);
+        let ([from, to], curve, alignment) = (self.part, self.curve, *alignment);
+        (1..=count).map(move |k| {
+            if k == count {
+                return to;
+            }
+            let t = f64::from(k) / f64::from(count);
+            let place = alignment.part_from_bed(&curve.over_bed(t));
+            Point3::new(place.x, place.y, from.z + (to.z - from.z) * t)
+        })
     }
 
     /// Returns how far the bed turns, radians; zero in part coordinates.

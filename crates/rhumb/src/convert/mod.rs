@@ -7,6 +7,7 @@
 
 mod arc;
 mod reader;
+mod segments;
 
 use std::io::{BufRead, Read, Write};
 use std::path::Path;
@@ -24,6 +25,8 @@ use crate::output;
 use crate::program_text::duration;
 use crate::settings::Job;
 use reader::{Meaning, Reader};
+
+pub use segments::{Unreadable, segments};
 
 /// What to convert and how.
 pub struct Request<'a> {

@@ -64,17 +64,7 @@ impl Tracer {
             self.flush();
             self.traces.push(Trace { kind, points: vec![*from] });
         }
-        // Curved pieces are drawn as many straight ones.
-        let bow = segment.curve.deviation_bound() / self.tolerance.max(JOINED);
-        let pieces = (bow.sqrt().ceil() as u32).clamp(1, 256);
-        for k in 1..=pieces {
-            let t = f64::from(k) / f64::from(pieces);
-            let point = if k == pieces {
-                *to
-            } else {
-                let place = self.alignment.part_from_bed(&segment.curve.over_bed(t));
-                Point3::new(place.x, place.y, from.z + (to.z - from.z) * t)
-            };
+        for point in segment.pieces(&self.alignment, self.tolerance.max(JOINED)) {
             self.point(point);
         }
     }
