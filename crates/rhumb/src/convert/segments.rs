@@ -128,7 +128,6 @@ impl Foreign {
             width: self.width,
             joints: None,
             part: [from, stroke.to],
-            middle: nalgebra::center(&from, &stroke.to),
             nearest: curve.nearest_to_axis(),
             curve,
             path,
