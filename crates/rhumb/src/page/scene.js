@@ -3,6 +3,9 @@
 /** Pieces that are drawn at once: as many as four corners each can be counted in 16 bits. */
 const CHUNK = 1 << 14;
 
+/** The two triangles of a ribbon. */
+const CORNERS = [0, 1, 2, 2, 1, 3];
+
 /** Entries in a row of the textures that hold the pieces. */
 const ROW = 2048;
 
@@ -10,25 +13,32 @@ const ROW = 2048;
 const CHUNKS_A_FRAME = 4;
 
 // Corners are not stored: each finds its piece by its number. That is as fast as instances on a
-// graphics card, and much faster without one.
+// graphics card, and ten times as fast without one. Only the sketch, which is small and must be
+// fast everywhere, has its corners stored.
 const RIBBON = `
-precision highp float; precision highp int; precision highp sampler2D; precision highp usampler2D;
-uniform sampler2D places, paints, sizes; uniform usampler2D runs;
-uniform mat4 modelViewMatrix, projectionMatrix;
-uniform vec3 eye, light; uniform int base; uniform bool sketched; uniform float grow;
-out vec3 colour; out float side; out vec2 lit; out float sky;
+precision highp float; precision highp int; precision highp sampler2D;
+#ifdef STORED
+in vec3 from; in vec3 to; in vec4 paint; in vec4 size;
+#else
+uniform sampler2D places, paints, sizes; uniform int base;
 ivec2 entry(int k) { return ivec2(k & 2047, k >> 11); }
+#endif
+uniform mat4 modelViewMatrix, projectionMatrix;
+uniform vec3 eye, light; uniform float grow;
+out vec3 colour;
+#ifdef PLAIN
+float side; vec2 lit; float sky;
+#else
+out float side; out vec2 lit; out float sky;
+#endif
 void main() {
+#ifndef STORED
   int a = (gl_VertexID >> 2) + base, b = a + 1;
-  if (sketched) {
-    uvec2 run = texelFetch(runs, entry(a), 0).xy;
-    a = int(run.x);
-    b = int(run.y);
-  }
   vec4 paint = texelFetch(paints, entry(a), 0);
   if (paint.a == 0.0) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
   vec3 from = texelFetch(places, entry(a), 0).xyz, to = texelFetch(places, entry(b), 0).xyz;
   vec4 size = texelFetch(sizes, entry(a), 0) * 255.0;
+#endif
   vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID & 2) - 1.0);
   vec3 way = to - from;
   float far = length(way);
@@ -45,21 +55,32 @@ void main() {
   reach = max(reach, size.z * length(eye - place) * 0.0006);
   place += across * corner.y * reach + along * (corner.x * 2.0 - 1.0) * half_size.x * 0.4;
   place.z -= half_size.y;
-  colour = paint.rgb;
   side = corner.y;
   lit = vec2(dot(across, light), dot(view, light));
   sky = view.z;
+#ifdef PLAIN
+  colour = paint.rgb * (0.4 + 0.14 * sky + 0.5 * max(lit.x * side * 0.7 + lit.y * 0.8, 0.0));
+#else
+  colour = paint.rgb;
+#endif
   gl_Position = projectionMatrix * modelViewMatrix * vec4(place, 1.0);
 }`;
 
 const RIBBON_COLOUR = `
 precision mediump float;
-in vec3 colour; in float side; in vec2 lit; in float sky;
+in vec3 colour;
+#ifndef PLAIN
+in float side; in vec2 lit; in float sky;
+#endif
 out vec4 shown;
 void main() {
+#ifdef PLAIN
+  shown = vec4(colour, 1.0);
+#else
   float facing = sqrt(max(1.0 - side * side, 0.0));
   float light = 0.36 + 0.14 * sky + 0.62 * max(lit.x * side + lit.y * facing, 0.0);
   shown = vec4(colour * light, 1.0);
+#endif
 }`;
 
 const DOT = `
@@ -122,6 +143,8 @@ class View {
   constructor(canvas, data) {
     this.data = data;
     this.drawer = drawer();
+    /** More pieces than these are drawn in several frames. */
+    this.atOnce = this.drawer.isSoftware ? 60000 : 3000000;
     // All colours are as they are written.
     THREE.ColorManagement.enabled = false;
     this.renderer = new THREE.WebGLRenderer({
@@ -159,16 +182,20 @@ class View {
       places: { value: texture(points, 4, THREE.RGBAFormat, THREE.FloatType) },
       paints: { value: this.paints },
       sizes: { value: texture(this.sizes, 4, THREE.RGBAFormat, THREE.UnsignedByteType) },
-      runs: { value: texture(new Uint32Array(2 * ROW), 2, THREE.RGIntegerFormat, THREE.UnsignedIntType) },
       eye: { value: new THREE.Vector3() }, light: { value: new THREE.Vector3() },
-      base: { value: 0 }, sketched: { value: false }, grow: { value: 1 },
+      base: { value: 0 }, grow: { value: 1 },
     };
-    this.material = new THREE.RawShaderMaterial({
+    const material = (defines) => new THREE.RawShaderMaterial({
       glslVersion: THREE.GLSL3, vertexShader: RIBBON, fragmentShader: RIBBON_COLOUR,
-      uniforms: this.uniforms, side: THREE.DoubleSide,
+      uniforms: this.uniforms, side: THREE.DoubleSide, defines,
     });
+    const plain = this.drawer.isSoftware ? { PLAIN: 1 } : {};
+    this.material = material(plain);
+    this.storedMaterial = material({ ...plain, STORED: 1 });
     const order = new Uint16Array(6 * CHUNK);
-    for (let k = 0; k < CHUNK; k += 1) order.set([0, 1, 2, 2, 1, 3].map((v) => 4 * k + v), 6 * k);
+    for (let k = 0; k < CHUNK; k += 1) {
+      for (let c = 0; c < 6; c += 1) order[6 * k + c] = 4 * k + CORNERS[c];
+    }
     this.order = new THREE.BufferAttribute(order, 1);
   }
 
@@ -184,16 +211,15 @@ class View {
     return sizes;
   }
 
-  /** A mesh of up to `CHUNK` ribbons: the pieces, or runs of the sketch, from `base` on. */
-  ribbons(base, sketched) {
+  /** A mesh of up to `CHUNK` pieces from `base` on. */
+  ribbons(base) {
     const geometry = new THREE.BufferGeometry();
     geometry.setIndex(this.order);
     const mesh = new THREE.Mesh(geometry, this.material);
     mesh.frustumCulled = false;
     mesh.onBeforeRender = () => {
       this.uniforms.base.value = base;
-      this.uniforms.sketched.value = sketched;
-      this.uniforms.grow.value = sketched ? this.sketch.grow : 1;
+      this.uniforms.grow.value = 1;
       this.material.uniformsNeedUpdate = true;
     };
     this.part.add(mesh);
@@ -211,7 +237,7 @@ class View {
         if (v < low[c]) low[c] = v;
         if (v > high[c]) high[c] = v;
       }
-      this.chunks.push({ mesh: this.ribbons(first, false), first, end, low, high });
+      this.chunks.push({ mesh: this.ribbons(first), first, end, low, high });
     }
   }
 
@@ -329,6 +355,7 @@ class View {
   }
 
   resize(width, height, ratio) {
+    this.ratio = ratio;
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
@@ -346,6 +373,12 @@ class View {
       return a + (b - a) * part;
     });
     return { place, bed: data.bed[move] + (data.bed[move + 1] - data.bed[move]) * share };
+  }
+
+  /** Without a graphics card pixels are dear: fewer of them while the picture moves. */
+  coarsen(moving) {
+    const ratio = this.ratio * (moving && this.drawer.isSoftware ? 0.6 : 1);
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
   }
 
   /** How many pieces a state shows. */
@@ -470,9 +503,8 @@ class Sketch {
   constructor(view) {
     this.view = view;
     this.budget = view.drawer.isSoftware ? 30000 : 1500000;
-    this.meshes = [];
     this.count = 0;
-    this.capacity = ROW;
+    this.capacity = 0;
     this.grow = 1;
   }
 
@@ -539,8 +571,8 @@ class Sketch {
   }
 
   show(state, moving, first, end) {
-    if (!moving || end - first <= this.budget) {
-      for (const mesh of this.meshes) mesh.visible = false;
+    if (!moving || end - first <= Math.min(this.budget, this.view.atOnce)) {
+      if (this.mesh) this.mesh.visible = false;
       return false;
     }
     if (!this.groups) this.prepare();
@@ -562,33 +594,71 @@ class Sketch {
     const key = `${low} ${top} ${stride}`;
     if (key !== this.key) this.fill(low, top, stride, total);
     this.key = key;
-    this.meshes.forEach((mesh, k) => { mesh.visible = k * CHUNK < this.count; });
+    this.mesh.visible = true;
     return true;
   }
 
   fill(low, top, stride, total) {
-    const { uniforms } = this.view;
-    if (total > this.capacity || !this.runs) {
-      this.capacity = ROW * Math.ceil(Math.max(total * 1.2, ROW) / ROW);
-      this.runs = new Uint32Array(2 * this.capacity);
-      uniforms.runs.value.dispose();
-      uniforms.runs.value = texture(this.runs, 2, THREE.RGIntegerFormat, THREE.UnsignedIntType);
-    }
+    const { data, colours, sizes } = this.view;
+    if (total > this.capacity || !this.mesh) this.build(Math.ceil(Math.max(total, 4096) * 1.2));
+    const { from, to, paint, size } = this.corners;
     let at = 0;
-    for (let g = low; g < top; g += 1) {
-      const group = this.groups[g];
-      const least = this.least(group, top, stride);
+    // From above, so that little is painted over.
+    for (let g = top - 1; g >= low; g -= 1) {
+      const group = this.groups[g], least = this.least(group, top, stride);
       for (let k = group.first; k < group.end; k += 1) {
         if (this.ranks[k] < least) continue;
-        this.runs[at++] = this.start[k];
-        this.runs[at++] = this.end[k];
+        const a = this.start[k], b = this.end[k];
+        for (const end = at + 4; at < end; at += 1) {
+          for (let c = 0; c < 3; c += 1) {
+            from[3 * at + c] = data.place[3 * a + c];
+            to[3 * at + c] = data.place[3 * b + c];
+          }
+          for (let c = 0; c < 4; c += 1) {
+            paint[4 * at + c] = colours[4 * a + c];
+            size[4 * at + c] = sizes[4 * a + c];
+          }
+        }
       }
     }
-    this.count = at / 2;
+    this.count = at / 4;
     this.grow = stride * 1.3;
-    uniforms.runs.value.needsUpdate = true;
-    while (this.meshes.length * CHUNK < this.count) this.meshes.push(this.view.ribbons(this.meshes.length * CHUNK, true));
-    this.meshes.forEach((mesh, k) => mesh.geometry.setDrawRange(0, 6 * Math.min(Math.max(this.count - k * CHUNK, 0), CHUNK)));
+    this.mesh.geometry.setDrawRange(0, 6 * this.count);
+    for (const name of Object.keys(this.corners)) {
+      const attribute = this.mesh.geometry.attributes[name];
+      attribute.clearUpdateRanges();
+      attribute.addUpdateRange(0, at * attribute.itemSize);
+      attribute.needsUpdate = true;
+    }
+  }
+
+  /** Makes room for so many runs. */
+  build(capacity) {
+    const { view } = this;
+    if (this.mesh) {
+      view.part.remove(this.mesh);
+      this.mesh.geometry.dispose();
+    }
+    this.capacity = capacity;
+    const n = 4 * capacity, order = new Uint32Array(6 * capacity);
+    for (let k = 0; k < capacity; k += 1) {
+      for (let c = 0; c < 6; c += 1) order[6 * k + c] = 4 * k + CORNERS[c];
+    }
+    this.corners = {
+      from: new Float32Array(3 * n), to: new Float32Array(3 * n), paint: new Uint8Array(4 * n), size: new Uint8Array(4 * n),
+    };
+    const geometry = new THREE.BufferGeometry();
+    for (const [name, array] of Object.entries(this.corners)) {
+      geometry.setAttribute(name, new THREE.BufferAttribute(array, array.length / n, name === 'paint'));
+    }
+    geometry.setIndex(new THREE.BufferAttribute(order, 1));
+    this.mesh = new THREE.Mesh(geometry, view.storedMaterial);
+    this.mesh.frustumCulled = false;
+    this.mesh.onBeforeRender = () => {
+      view.uniforms.grow.value = this.grow;
+      view.storedMaterial.uniformsNeedUpdate = true;
+    };
+    view.part.add(this.mesh);
   }
 
   /** Learns from how long a frame took, ms. */

@@ -271,7 +271,8 @@ class Page {
     }
     if (state.playing) this.advance(Math.min(took, 200) / 1000);
     const moving = state.playing || performance.now() - this.movedAt < 160;
-    const isSlow = !moving && view.pieces(state) > view.sketch.budget;
+    const isSlow = !moving && view.pieces(state) > view.atOnce;
+    view.coarsen(moving && view.pieces(state) > view.sketch.budget);
     view.show(state, moving || isSlow);
     view.draw();
     if (moving && this.wasMoving && took < 1000) view.sketch.learn(took);
@@ -284,9 +285,12 @@ class Page {
     } else if (moving && !this.waiting) {
       // Once more when all is still, with every piece.
       clearTimeout(this.still);
-      this.still = setTimeout(() => this.sync(), 180);
+      this.still = setTimeout(() => { this.still = 0; this.sync(); }, 180);
     }
   }
+
+  /** Whether every piece is drawn and nothing is about to change. */
+  get isStill() { return !this.waiting && !this.slowly && !this.still && !this.state.playing; }
 
   request() {
     if (this.waiting) return;
