@@ -19,6 +19,7 @@ mod program;
 mod rotation;
 mod roundtrip;
 mod run;
+mod send;
 mod settings;
 mod shared;
 mod slice;

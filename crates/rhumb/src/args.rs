@@ -79,6 +79,8 @@ pub enum Command {
     Verify(Verify),
     /// Draw a program
     Preview(Preview),
+    /// Send a program to a print server, Moonraker or OctoPrint
+    Send(Send),
     /// List, show and check settings
     #[command(subcommand)]
     Profile(Profile),
@@ -479,6 +481,64 @@ pub struct Preview {
     /// Which settings to use; the dialect is the one that the program names
     #[command(flatten)]
     pub settings: SettingsArguments,
+}
+
+/// Arguments of `send`.
+#[derive(Args)]
+pub struct Send {
+    /// The program
+    pub program: PathBuf,
+    /// The print server, such as <http://printer.local:7125>
+    #[arg(long, value_name = "URL")]
+    pub to: String,
+    /// Its key; better in RHUMB_API_KEY or in the key file, where other users do not see it
+    #[arg(long, value_name = "KEY")]
+    pub api_key: Option<String>,
+    /// A file with keys, lines of "HOST[:PORT]" = "KEY", that only its owner can read
+    /// [default: ~/.config/rhumb/keys.toml]
+    #[arg(long, value_name = "KEYS.toml")]
+    pub keys: Option<PathBuf>,
+    /// Start to print it
+    #[arg(long)]
+    pub start: bool,
+    /// What to call it there
+    #[arg(long, value_name = "NAME.gcode")]
+    pub name: Option<String>,
+    /// What to do when a file of this name is there
+    #[arg(long, value_enum, default_value_t = IfExists::Refuse)]
+    pub if_exists: IfExists,
+    /// Which kind of server it is; asked when not given
+    #[arg(long, value_enum)]
+    pub server: Option<ServerKind>,
+}
+
+impl std::fmt::Debug for Send {
+    /// All but the key.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Send").field("program", &self.program).finish_non_exhaustive()
+    }
+}
+
+/// What to do with a file of the same name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum IfExists {
+    /// Send nothing.
+    Refuse,
+    /// Replace it.
+    Replace,
+    /// Store the new one beside it, with a number.
+    Rename,
+    /// Take it for the same file: send nothing, but start it when that is wanted.
+    Keep,
+}
+
+/// Kinds of print servers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ServerKind {
+    /// Klipper's.
+    Moonraker,
+    /// `OctoPrint`.
+    Octoprint,
 }
 
 /// What is plotted.

@@ -40,6 +40,7 @@ pub mod commands;
 pub mod convert;
 pub mod estimate;
 pub mod failure;
+pub mod http;
 pub mod input;
 pub mod interrupt;
 pub mod levels;

@@ -7,6 +7,7 @@ mod model;
 mod orient;
 mod preview;
 mod profile;
+mod send;
 mod slice;
 mod verify;
 
@@ -42,6 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         Command::Calibrate(calibrate) => calibrate::run(calibrate, manner),
         Command::Verify(arguments) => verify::run(arguments, manner),
         Command::Preview(arguments) => preview::run(arguments),
+        Command::Send(arguments) => send::run(arguments, manner),
         Command::Profile(profile) => profile::run(profile, manner),
         Command::Model(arguments) => model::run(arguments),
     }
