@@ -15,6 +15,7 @@ mod house;
 mod interrupt;
 mod limits;
 mod names;
+mod preview;
 mod program;
 mod rotation;
 mod roundtrip;

@@ -1,6 +1,7 @@
 //! `rhumb preview`: pictures of a program, drawn from what the twin replayed.
 
 use mesh::mesh::Mesh;
+use nalgebra::Vector2;
 use twin::picture::camera::Gaze;
 use twin::picture::deposit::{self, DepositSink, Picture, deposit_png};
 use twin::picture::layer::{LayerSink, layer_svg};
@@ -13,7 +14,7 @@ use super::verify::{job_of, names_itself, part};
 use super::{DONE, display_name, write_file};
 use crate::args::{Coloring, Plot, Preview};
 use crate::check::{check, findings};
-use crate::convert::segments;
+use crate::convert::{middle, segments};
 use crate::failure::Failure;
 use crate::input;
 use crate::page::columns::Columns;
@@ -86,15 +87,28 @@ impl<'a> Program<'a> {
         })
     }
 
-    /// Reads it to its end; `each` sees every motion.
-    fn replay(&self, mut each: impl FnMut(&Segment)) -> Result<Reading, Failure> {
+    /// Reads it to its end; `each` sees every motion. Another slicer's program is moved so that the
+    /// middle of its print lies on the axis.
+    fn replay(&self, each: impl FnMut(&Segment)) -> Result<Reading, Failure> {
+        let origin = match self.is_foreign {
+            true => middle(self.bytes.as_slice(), &self.name()).unwrap_or_default(),
+            false => Vector2::zeros(),
+        };
+        self.replay_about(origin, each)
+    }
+
+    fn replay_about(
+        &self,
+        origin: Vector2<f64>,
+        mut each: impl FnMut(&Segment),
+    ) -> Result<Reading, Failure> {
         if !self.is_foreign {
             let part = self.part.as_ref();
             let verdict = check(self.bytes.as_slice(), &self.job, part, false, each)?;
             return Ok(Reading { findings: findings(&verdict), verdict: Some(verdict) });
         }
         let mut count = 0;
-        let (unreadable, more) = segments(&self.bytes, |segment| {
+        let (unreadable, more) = segments(&self.bytes, origin, |segment| {
             count += 1;
             each(segment);
         });
@@ -126,8 +140,9 @@ impl<'a> Program<'a> {
     fn page(&self) -> Result<String, Failure> {
         let job = &self.job;
         let mut columns = Columns::new(&job.printer);
-        let reading = self.replay(|segment| columns.add(segment))?;
-        let axis = job.printer.alignment.part_from_bed(&nalgebra::Vector2::zeros());
+        // Places are told as the program says them.
+        let reading = self.replay_about(Vector2::zeros(), |segment| columns.add(segment))?;
+        let axis = job.printer.alignment.part_from_bed(&Vector2::zeros());
         let is_judged = !self.is_foreign || !reading.findings.is_empty();
         let about = About {
             name: &self.name(),

@@ -33,9 +33,13 @@ pub struct Unreadable {
 const MOST_KEPT: usize = 20;
 
 /// Reads a program, tells `each` motion, and returns the first lines that were not understood and
-/// how many more there are.
-pub fn segments(program: &[u8], mut each: impl FnMut(&Segment)) -> (Vec<Unreadable>, usize) {
-    let mut foreign = Foreign::new(program);
+/// how many more there are. `origin` is the place of its bed that becomes the axis, mm.
+pub fn segments(
+    program: &[u8],
+    origin: Vector2<f64>,
+    mut each: impl FnMut(&Segment),
+) -> (Vec<Unreadable>, usize) {
+    let mut foreign = Foreign::new(program, origin);
     let (mut unreadable, mut more) = (Vec::new(), 0);
     let mut strokes = Vec::new();
     for (line, bytes) in (1..).zip(program.split(|byte| *byte == b'\n')) {
@@ -76,12 +80,12 @@ struct Foreign {
 }
 
 impl Foreign {
-    fn new(program: &[u8]) -> Self {
+    fn new(program: &[u8], origin: Vector2<f64>) -> Self {
         let has = |mark: &[u8]| program.windows(mark.len()).any(|window| window == mark);
         let numbers_layers = has(b";LAYER:");
         Self {
-            reader: Reader::new(Vector2::zeros(), Point3::origin(), ARC_TOLERANCE),
-            at: Point3::origin(),
+            reader: Reader::new(origin, Point3::new(-origin.x, -origin.y, 0.0), ARC_TOLERANCE),
+            at: Point3::new(-origin.x, -origin.y, 0.0),
             role: Role::Custom,
             width: 0.0,
             layer: None,
@@ -170,7 +174,10 @@ mod tests {
 
     fn read(text: &str) -> Vec<Segment> {
         let mut all = Vec::new();
-        assert_eq!(segments(text.as_bytes(), |segment| all.push(*segment)), (Vec::new(), 0));
+        assert_eq!(
+            segments(text.as_bytes(), Vector2::zeros(), |segment| all.push(*segment)),
+            (Vec::new(), 0)
+        );
         all
     }
 
@@ -209,9 +216,19 @@ mod tests {
     }
 
     #[test]
+    fn the_origin_becomes_the_axis() {
+        let mut all = Vec::new();
+        let program = b"G1 X110 Y100 F600\nG1 Y105 E1";
+        segments(program, Vector2::new(100.0, 100.0), |segment| all.push(*segment));
+        assert_eq!(all[1].part[1], Point3::new(10.0, 5.0, 0.0));
+        assert_eq!(all[0].part[0], Point3::new(-100.0, -100.0, 0.0));
+    }
+
+    #[test]
     fn what_is_not_understood_is_told_and_left_out() {
         let mut count = 0;
-        let (unreadable, more) = segments(b"G1 X1 F600\nG1 X{y}\nG2 X5\nG1 X2\n", |_| count += 1);
+        let (unreadable, more) =
+            segments(b"G1 X1 F600\nG1 X{y}\nG2 X5\nG1 X2\n", Vector2::zeros(), |_| count += 1);
         assert_eq!((count, more), (2, 0));
         assert_eq!(unreadable.iter().map(|u| u.line).collect::<Vec<_>>(), [2, 3]);
     }
