@@ -176,19 +176,33 @@ impl Alignment {
         branch: Branch,
         near: BedTurn,
     ) -> Result<Joints, Unreachable> {
-        let q = self.over_bed(&part.xy());
-        let v = self.b + self.b1 * part.z;
+        self.joints_over_bed(&self.over_bed(&part.xy()), part.z, branch, near)
+    }
+
+    /// Like [`joints_from_part`](Self::joints_from_part), for a point of the bed seen from the axis.
+    ///
+    /// # Errors
+    ///
+    /// [`Unreachable::Disc`] inside the disc that the rail misses.
+    pub fn joints_over_bed(
+        &self,
+        q: &Vector2<f64>,
+        z: f64,
+        branch: Branch,
+        near: BedTurn,
+    ) -> Result<Joints, Unreachable> {
+        let v = self.miss(z);
         let square = q.norm_squared() - v * v;
         if square < 0.0 {
             return Err(Unreachable::Disc { radius: q.norm(), miss: v.abs() });
         }
         let u = branch.sign() * square.sqrt();
-        let turn = if q == Vector2::zeros() {
+        let turn = if *q == Vector2::zeros() {
             near
         } else {
             near.nearest(self.bed.turn((u * q.y - v * q.x).atan2(u * q.x + v * q.y)))
         };
-        Ok(Joints { s: u - self.a - self.a1 * part.z, turn, z: part.z })
+        Ok(Joints { s: u - self.a - self.a1 * z, turn, z })
     }
 
     /// Returns where the nozzle stands in Machine, mm.

@@ -7,8 +7,8 @@ use machine::kinematics::Unreachable;
 use machine::profile::Printer;
 use machine::program::Move;
 
-use crate::resample::{Leg, ResampleParams, Resampler};
-use crate::route::{Kind, Stroke};
+use crate::resample::{FlatLegs, ResampleParams, Resampler};
+use crate::route::Stroke;
 use crate::speed::{Limits, Pace, durations, travels};
 use crate::time;
 
@@ -16,13 +16,19 @@ use crate::time;
 #[derive(Debug, Clone)]
 pub struct Follower {
     printer: Printer,
-    params: ResampleParams,
     resampler: Resampler,
     limits: Limits,
     pace: Pace,
-    /// Filament of strokes too short to be moves, mm.
-    owed: f64,
     time: f64,
+}
+
+/// The moves of consecutive strokes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Followed {
+    /// In order.
+    pub moves: Vec<Move>,
+    /// How many of them each stroke has.
+    pub counts: Vec<usize>,
 }
 
 /// A stroke that cannot be followed.
@@ -42,62 +48,42 @@ impl Follower {
     pub fn new(printer: &Printer, params: ResampleParams) -> Self {
         Self {
             printer: printer.clone(),
-            params,
             resampler: Resampler::new(printer, params),
             limits: Limits::of(printer, params.dialect.space),
             pace: Pace::REST,
-            owed: 0.0,
             time: 0.0,
         }
     }
 
     /// The machine has been homed by other means.
     pub fn homed(&mut self) {
-        self.resampler = Resampler::new(&self.printer, self.params);
+        self.resampler = self.resampler.at_home(&self.printer);
         self.pace = Pace::REST;
     }
 
-    /// Returns the moves of each stroke.
+    /// Returns the moves of the strokes.
     ///
     /// # Errors
     ///
     /// [`FollowError`] for the first stroke out of reach.
-    pub fn follow(&mut self, strokes: &[Stroke]) -> Result<Vec<Vec<Move>>, FollowError> {
+    pub fn follow(&mut self, strokes: &[Stroke]) -> Result<Followed, FollowError> {
         let start = self.resampler.joints();
-        let mut groups = self
+        let FlatLegs { legs, counts } = self
             .resampler
-            .legs_of_each(strokes)
+            .flat_legs(strokes)
             .map_err(|(stroke, source)| FollowError { stroke, source })?;
-        for (stroke, legs) in strokes.iter().zip(&mut groups) {
-            self.owe(stroke, legs);
-        }
-        let sizes: Vec<usize> = groups.iter().map(Vec::len).collect();
-        let legs: Vec<Leg> = groups.into_iter().flatten().collect();
         let travels = travels(&legs, start);
         let (times, pace) = durations(&legs, &travels, self.pace, &self.limits);
         self.pace = pace;
         self.time += time::estimate(&legs, &travels, &times, &self.printer);
-        let mut moves = legs.iter().zip(times).map(|(leg, duration)| Move {
+        let moves = legs.iter().zip(times).map(|(leg, duration)| Move {
             to: leg.to,
             at: leg.at,
             filament: leg.filament,
             path: leg.path,
             duration,
         });
-        Ok(sizes.iter().map(|&size| moves.by_ref().take(size).collect()).collect())
-    }
-
-    /// Keeps the filament of a stroke that became no move for the next one that lays material.
-    fn owe(&mut self, stroke: &Stroke, legs: &mut [Leg]) {
-        if legs.is_empty() {
-            self.owed += stroke.filament;
-        } else if stroke.kind == Kind::Print && self.owed != 0.0 {
-            let path: f64 = legs.iter().map(|leg| leg.path).sum();
-            for leg in legs.iter_mut() {
-                leg.filament += self.owed * leg.path / path;
-            }
-            self.owed = 0.0;
-        }
+        Ok(Followed { moves: moves.collect(), counts })
     }
 
     /// Returns the time estimated so far, s.
@@ -110,6 +96,7 @@ impl Follower {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::route::Kind;
     use crate::testing::printer;
     use machine::gcode::dialect::POLAR;
     use nalgebra::Point3;
@@ -129,10 +116,10 @@ mod tests {
         follower.follow(&[travel]).unwrap();
         let strokes: Vec<Stroke> =
             (1..=1000).map(|k| print(f64::from(k) * 1e-4 + f64::from(k / 50), 0.01)).collect();
-        let moves = follower.follow(&strokes).unwrap();
-        let fed: f64 = moves.iter().flatten().map(|motion| motion.filament).sum();
-        assert!((fed + follower.owed - 10.0).abs() < 1e-9, "{fed}");
-        assert!(moves.iter().any(Vec::is_empty), "some are too short");
+        let Followed { moves, counts } = follower.follow(&strokes).unwrap();
+        let fed: f64 = moves.iter().map(|motion| motion.filament).sum();
+        assert!((fed + follower.resampler.owed() - 10.0).abs() < 1e-9, "{fed}");
+        assert!(counts.contains(&0), "some are too short");
         assert!(follower.time() > 0.4);
     }
 

@@ -24,7 +24,7 @@ use machine::profile::{Axis, Printer};
 use machine::program::{BedTurn, Joints};
 use nalgebra::{Point2, Point3, Rotation2};
 
-use crate::axis::{Piece, keep_clear, outside};
+use crate::axis::{Piece, distance_to_axis, keep_clear, outside};
 use crate::route::{Kind, Stroke};
 use crate::winding::{extent, unwinding};
 
@@ -83,6 +83,10 @@ const SMALL_TURN: f64 = 0.01;
 /// fortieth of a layer.
 const HEIGHT_TOLERANCE_MM: f64 = 0.005;
 
+/// How far rounding may bring both ends of a move from where they should be, mm: half a last place of
+/// rail and of angle, at the rim of the largest beds.
+const ROUNDING_MM: f64 = 1e-3;
+
 /// What is shorter is the last digits of one place, mm: a tenth of the finest last place.
 const LEAST_PATH_MM: f64 = 1e-6;
 
@@ -91,6 +95,15 @@ const REACH_SLACK_MM: f64 = 5e-4;
 
 /// Halvings after which a piece is taken as it is; 2⁻⁴⁰ of any stroke is far below a step.
 const MOST_HALVINGS: u32 = 40;
+
+/// The legs of consecutive strokes in one list.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FlatLegs {
+    /// In order.
+    pub(crate) legs: Vec<Leg>,
+    /// How many each stroke has.
+    pub(crate) counts: Vec<usize>,
+}
 
 /// Turns strokes into legs; remembers where the joints stand.
 #[derive(Debug, Clone)]
@@ -113,6 +126,8 @@ pub struct Resampler {
     over_bed: Point2<f64>,
     /// Where it stands in the part, as the text says it.
     at_part: Point3<f64>,
+    /// Filament of strokes too short to be moves, for the next one that lays material, mm.
+    owed: f64,
 }
 
 /// Where the nozzle is to be, over the bed.
@@ -147,7 +162,23 @@ impl Resampler {
             branch: Branch::Near,
             over_bed: Point2::from(printer.alignment.over_bed(&at.xy())),
             at_part: at,
+            owed: 0.0,
         }
+    }
+
+    /// The same after the printer has been homed by other means.
+    #[must_use]
+    pub(crate) fn at_home(&self, printer: &Printer) -> Self {
+        let joints = printer.home;
+        let at_part = self.alignment.part_from_joints(&joints);
+        let over_bed = Point2::from(self.alignment.over_bed(&at_part.xy()));
+        Self { joints, branch: Branch::Near, over_bed, at_part, ..self.clone() }
+    }
+
+    /// Filament of strokes too short to be moves that is still to be laid, mm.
+    #[cfg(test)]
+    pub(crate) fn owed(&self) -> f64 {
+        self.owed
     }
 
     /// Keeps the carriage on the near side of the axis. Where layers are curved, the way from one side
@@ -175,43 +206,52 @@ impl Resampler {
     ///
     /// [`Unreachable`] where the rail misses the axis by more than a stroke keeps from it.
     pub fn legs(&mut self, strokes: &[Stroke]) -> Result<Vec<Vec<Leg>>, Unreachable> {
-        self.legs_of_each(strokes).map_err(|(_, error)| error)
+        let flat = self.flat_legs(strokes).map_err(|(_, error)| error)?;
+        let mut legs = flat.legs.into_iter();
+        Ok(flat.counts.iter().map(|&count| legs.by_ref().take(count).collect()).collect())
     }
 
-    /// Like [`legs`](Self::legs), and says which stroke is out of reach.
-    pub(crate) fn legs_of_each(
+    /// Like [`legs`](Self::legs) in one list, and says which stroke is out of reach.
+    pub(crate) fn flat_legs(
         &mut self,
         strokes: &[Stroke],
-    ) -> Result<Vec<Vec<Leg>>, (usize, Unreachable)> {
-        let mut all = Vec::with_capacity(strokes.len());
-        while all.len() < strokes.len() {
-            let index = all.len();
+    ) -> Result<FlatLegs, (usize, Unreachable)> {
+        let mut legs = Vec::with_capacity(2 * strokes.len());
+        let mut counts = Vec::with_capacity(strokes.len());
+        while counts.len() < strokes.len() {
+            let index = counts.len();
+            let before = legs.len();
             if let Some((count, leg)) = self.long_move(&strokes[index..]) {
                 // The strokes before the last of them have no leg of their own.
-                all.resize_with(index + count - 1, Vec::new);
-                all.push(vec![leg]);
+                counts.resize(index + count - 1, 0);
+                legs.push(leg);
             } else {
-                all.push(self.legs_of(strokes, index).map_err(|error| (index, error))?);
+                self.legs_of(strokes, index, &mut legs).map_err(|error| (index, error))?;
             }
+            counts.push(legs.len() - before);
         }
-        Ok(all)
+        Ok(FlatLegs { legs, counts })
     }
 
-    fn legs_of(&mut self, strokes: &[Stroke], index: usize) -> Result<Vec<Leg>, Unreachable> {
+    fn legs_of(
+        &mut self,
+        strokes: &[Stroke],
+        index: usize,
+        legs: &mut Vec<Leg>,
+    ) -> Result<(), Unreachable> {
         let stroke = &strokes[index];
         let at = turned(&self.azimuth, &stroke.to);
         let target =
             Target { over_bed: Point2::from(self.alignment.over_bed(&at.xy())), z: stroke.to.z };
-        let mut legs = Vec::new();
         if self.params.dialect.space == Space::Part {
-            self.straight(stroke, at, &mut legs);
+            self.straight(stroke, at, legs);
+            Ok(())
         } else if stroke.kind == Kind::Filament || target.over_bed == self.over_bed {
-            self.standing(stroke, target.z, &mut legs)?;
+            self.standing(stroke, target.z, legs)
         } else {
-            self.across(strokes, index, target, &mut legs)?;
-            self.unwind(strokes, index, &mut legs)?;
+            self.across(strokes, index, target, legs)?;
+            self.unwind(strokes, index, legs)
         }
-        Ok(legs)
     }
 
     /// A stroke in a dialect whose moves are straight over the part.
@@ -317,11 +357,23 @@ impl Resampler {
         }
         // The stroke's filament is spread over its legs by length.
         let length: f64 = legs[first..].iter().map(|leg| leg.path).sum();
+        let filament = self.with_owed(stroke.kind, stroke.filament, legs.len() > first);
         for leg in &mut legs[first..] {
-            leg.filament = stroke.filament * leg.path / length;
+            leg.filament = filament * leg.path / length;
             leg.speed = stroke.speed;
         }
         Ok(())
+    }
+
+    /// The filament of a stroke with what strokes before it could not lay; or none, when it is too
+    /// short to be a move itself.
+    fn with_owed(&mut self, kind: Kind, filament: f64, moves: bool) -> f64 {
+        if !moves {
+            self.owed += filament;
+            return 0.0;
+        }
+        let owed = if kind == Kind::Print { std::mem::take(&mut self.owed) } else { 0.0 };
+        filament + owed
     }
 
     /// Follows a stroke on the present side of the rail, round the axis where need be.
@@ -331,6 +383,12 @@ impl Resampler {
         target: &Target,
         legs: &mut Vec<Leg>,
     ) -> Result<(), Unreachable> {
+        let tolerance =
+            if kind == Kind::Print { self.params.chord } else { self.params.travel_chord };
+        // Most lines are nowhere near.
+        if distance_to_axis(&self.over_bed, &target.over_bed) >= self.clearance {
+            return self.line(kind, target, tolerance, 0, legs);
+        }
         let from = Target {
             over_bed: outside(self.over_bed, target.over_bed, self.clearance),
             z: self.joints.z,
@@ -346,11 +404,6 @@ impl Resampler {
                 if left > 0.0 { target.z - (target.z - from.z) * left / whole } else { target.z };
             match piece {
                 Piece::Line(to) => {
-                    let tolerance = if kind == Kind::Print {
-                        self.params.chord
-                    } else {
-                        self.params.travel_chord
-                    };
                     self.line(kind, &Target { over_bed: *to, z }, tolerance, 0, legs)?;
                 }
                 Piece::Arc(sweep, to) => {
@@ -400,12 +453,26 @@ impl Resampler {
             unit.perp(&(self.over_bed_at(joints) - self.over_bed)).abs() <= tolerance
         };
         // Firmwares that take part coordinates run some moves straight and some, in pieces of their
-        // own choice, as the joints do: both ways must be near.
-        [0.25, 0.5, 0.75].into_iter().all(|share| {
-            is_near(&machine::gcode::dialect::POLAR.between(&self.joints, to, share))
-                && (self.params.dialect.space == Space::Joints
-                    || is_near(&self.params.dialect.between(&self.joints, to, share)))
-        }) && self.turns_evenly(to, turn)
+        // own choice, as the joints do: both ways must be near. The middle is mostly the farthest.
+        let along_joints =
+            |share: f64| is_near(&machine::gcode::dialect::POLAR.between(&self.joints, to, share));
+        let as_written =
+            |share: f64| is_near(&self.params.dialect.between(&self.joints, to, share));
+        const SHARES: [f64; 3] = [0.5, 0.25, 0.75];
+        (self.deviation_bound(to) <= tolerance || SHARES.into_iter().all(along_joints))
+            && (self.params.dialect.space == Space::Joints || SHARES.into_iter().all(as_written))
+            && self.turns_evenly(to, turn)
+    }
+
+    /// No move to `to` that is straight in joint space leaves the line to its end by more than this,
+    /// mm, but for the rounding of its ends: an eighth of the greatest second derivative of the place
+    /// over the bed, which is `2θ'·ŵ' − θ'²·w` for the nozzle at `w` in the frame of the rail.
+    fn deviation_bound(&self, to: &Joints) -> f64 {
+        let (from, end) = (self.alignment.nozzle(&self.joints), self.alignment.nozzle(to));
+        let turn = (to.turn.radians() - self.joints.turn.radians()).abs();
+        let reach = from.norm_squared().max(end.norm_squared()).sqrt();
+        let run = (end - from).norm();
+        (2.0 * turn * run + turn * turn * reach) / 8.0 + ROUNDING_MM
     }
 
     /// Whether the lift, running evenly, keeps to the bed as it was probed.
@@ -486,29 +553,32 @@ impl Resampler {
         within(&self.rail, "carriage", to.s)?;
         within(&self.lift, "lift", to.z)?;
         let to = self.params.dialect.rounded_joints(&to);
-        let path = self.path_length(&to);
+        let at = self.alignment.part_from_joints(&to);
+        let path = self.path_length(&to, at);
         if path < LEAST_PATH_MM {
             return Ok(());
         }
         self.joints = to;
         self.over_bed = target.over_bed;
-        let at = self.alignment.part_from_joints(&to);
         self.at_part = at;
         legs.push(Leg { kind, to, at, filament: 0.0, path, speed: 0.0 });
         Ok(())
     }
 
-    /// Length of the way of the nozzle over the part in one move.
-    fn path_length(&self, to: &Joints) -> f64 {
+    /// Length of the way of the nozzle over the part in one move to `to`, which is at `end`.
+    fn path_length(&self, to: &Joints, end: Point3<f64>) -> f64 {
         let turn = (to.turn.radians() - self.joints.turn.radians()).abs();
         // Below a tenth of a radian arc and chord agree to 0.04 %.
         let pieces = (turn / 0.1).ceil().clamp(1.0, 1000.0) as u32;
-        let mut from = self.alignment.part_from_joints(&self.joints);
-        (1..=pieces)
-            .map(|k| {
-                let share = f64::from(k) / f64::from(pieces);
-                let joints = self.params.dialect.between(&self.joints, to, share);
-                let next = self.alignment.part_from_joints(&joints);
+        let mut from = self.at_part;
+        let between = (1..pieces).map(|k| {
+            let share = f64::from(k) / f64::from(pieces);
+            let joints = self.params.dialect.between(&self.joints, to, share);
+            self.alignment.part_from_joints(&joints)
+        });
+        between
+            .chain(std::iter::once(end))
+            .map(|next| {
                 let length = (next - from).norm();
                 from = next;
                 length
@@ -517,9 +587,12 @@ impl Resampler {
     }
 
     fn joints_at(&self, target: &Target) -> Result<Joints, Unreachable> {
-        let part = self.alignment.part_from_bed(&target.over_bed.coords);
-        let part = Point3::new(part.x, part.y, target.z);
-        self.alignment.joints_from_part(&part, self.branch, self.joints.turn)
+        self.joints_on(target, self.branch)
+    }
+
+    fn joints_on(&self, target: &Target, branch: Branch) -> Result<Joints, Unreachable> {
+        let near = self.joints.turn;
+        self.alignment.joints_over_bed(&target.over_bed.coords, target.z, branch, near)
     }
 
     fn over_bed_at(&self, joints: &Joints) -> Point2<f64> {
@@ -549,10 +622,7 @@ impl Resampler {
     /// Whether one move to the other side of the axis stays near its line: with one end close to
     /// the axis a small miss is a large angle there, which the bed turns through all along the move.
     fn runs_straight_to(&self, target: &Target, branch: Branch) -> bool {
-        let part = self.alignment.part_from_bed(&target.over_bed.coords);
-        let part = Point3::new(part.x, part.y, target.z);
-        self.alignment
-            .joints_from_part(&part, branch, self.joints.turn)
+        self.joints_on(target, branch)
             .is_ok_and(|to| self.is_near_enough(&to, target, self.params.chord))
     }
 

@@ -142,19 +142,48 @@ fn at_speed(leg: &Leg, travel: &Travel, limits: &Limits) -> f64 {
 }
 
 fn keep_accelerations(durations: &mut [f64], travels: &[Travel], before: Pace, limits: &Limits) {
+    // Pairs of neighbours of which one changed since they were found to agree; most never change.
+    let mut open = vec![true; durations.len().saturating_sub(1)];
     for _ in 0..MOST_PASSES {
         let mut changed = join_on(before, durations, travels, limits);
-        for i in 1..durations.len() {
-            changed |= agree(i - 1, durations, travels, limits);
+        if let Some(first) = open.first_mut().filter(|_| changed) {
+            *first = true;
         }
-        changed |= come_to_rest(durations, travels, limits);
-        for i in (1..durations.len()).rev() {
-            changed |= agree(i - 1, durations, travels, limits);
+        for i in 0..open.len() {
+            changed |= look_again(i, &mut open, durations, travels, limits);
+        }
+        let rests = come_to_rest(durations, travels, limits);
+        if let Some(last) = open.last_mut().filter(|_| rests) {
+            *last = true;
+        }
+        changed |= rests;
+        for i in (0..open.len()).rev() {
+            changed |= look_again(i, &mut open, durations, travels, limits);
         }
         if !changed {
             return;
         }
     }
+}
+
+/// Makes moves `i` and `i + 1` agree where need be; returns whether anything changed.
+fn look_again(
+    i: usize,
+    open: &mut [bool],
+    durations: &mut [f64],
+    travels: &[Travel],
+    limits: &Limits,
+) -> bool {
+    if !open[i] {
+        return false;
+    }
+    let changed = agree(i, durations, travels, limits);
+    open[i] = changed;
+    if changed {
+        let neighbours = i.saturating_sub(1)..=(i + 1).min(open.len() - 1);
+        open[neighbours].fill(true);
+    }
+    changed
 }
 
 /// Makes the first move agree with what ran before it, which can no longer change.
@@ -203,13 +232,15 @@ fn agree(i: usize, durations: &mut [f64], travels: &[Travel], limits: &Limits) -
     for k in 0..2 {
         let acceleration = limits.axes[k].acceleration;
         let distances = [travels[i].axes[k], travels[i + 1].axes[k]];
-        let speeds = [distances[0] / durations[i], distances[1] / durations[i + 1]];
         let between = f64::midpoint(durations[i], durations[i + 1]);
-        let excess = (speeds[1] - speeds[0]).abs() / (between * acceleration);
-        if excess <= 1.0 + SLACK {
+        // Both sides of `change of speed <= acceleration * time`, times both durations.
+        let change = (distances[1] * durations[i] - distances[0] * durations[i + 1]).abs();
+        let allowed = between * acceleration * durations[i] * durations[i + 1];
+        if change <= allowed * (1.0 + SLACK) {
             continue;
         }
         changed = true;
+        let speeds = [distances[0] / durations[i], distances[1] / durations[i + 1]];
         let faster = usize::from(speeds[1].abs() > speeds[0].abs());
         let slower = 1 - faster;
         let wanted = slowed(distances[faster], speeds[slower], durations[i + slower], acceleration);
@@ -217,7 +248,7 @@ fn agree(i: usize, durations: &mut [f64], travels: &[Travel], limits: &Limits) -
             durations[i + faster] = durations[i + faster].max(wanted);
         } else {
             // They run against each other: both give way alike.
-            let stretch = excess.sqrt();
+            let stretch = (change / allowed).sqrt();
             durations[i] *= stretch;
             durations[i + 1] *= stretch;
         }

@@ -291,6 +291,9 @@ pub struct Convert {
     /// what is printed
     #[arg(long, value_name = "X,Y|auto", default_value = "0,0", allow_hyphen_values = true)]
     pub origin: String,
+    /// Do not check the finished program
+    #[arg(long)]
+    pub no_verify: bool,
     /// Which settings to use
     #[command(flatten)]
     pub settings: SettingsArguments,

@@ -88,13 +88,29 @@ const LONGEST_LINE: usize = 1 << 20;
 /// Returns the failure that refuses a program with errors; `None` for one that may be printed.
 #[must_use]
 pub fn refusal(verdict: &Verdict) -> Option<Failure> {
+    refusal_for(verdict, |_| true)
+}
+
+/// What a converted program owes to us, and not to the one that it was made of.
+const OURS: [&str; 5] = ["text", "reach", "axis", "speed", "acceleration"];
+
+/// Returns the failure that refuses a converted program; `None` for one that may be printed as far as
+/// it is our work. That a source does not home, or lays with the filament drawn back, is found and
+/// said, and no reason to refuse.
+#[must_use]
+pub fn refusal_of_converted(verdict: &Verdict) -> Option<Failure> {
+    refusal_for(verdict, |check| OURS.contains(&check))
+}
+
+fn refusal_for(verdict: &Verdict, counts: impl Fn(&str) -> bool) -> Option<Failure> {
+    let is_fault = |severity: Severity, check: &str| severity == Severity::Error && counts(check);
     let errors: Vec<&Finding> =
-        verdict.findings.iter().filter(|f| f.severity == Severity::Error).collect();
+        verdict.findings.iter().filter(|f| is_fault(f.severity, f.check)).collect();
     let first = errors.first()?;
     let omitted: usize = verdict
         .omitted
         .iter()
-        .filter(|omitted| omitted.severity == Severity::Error)
+        .filter(|omitted| is_fault(omitted.severity, omitted.check))
         .map(|omitted| omitted.count)
         .sum();
     let count = errors.len() + omitted;

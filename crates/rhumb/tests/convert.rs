@@ -6,7 +6,7 @@ use machine::profile::Printer;
 use machine::program::Role;
 use nalgebra::{Point2, Vector2};
 use rhumb::check::check;
-use rhumb::convert::{Converted, Request, convert, middle};
+use rhumb::convert::{Converted, Request, convert, convert_checked, middle};
 use rhumb::failure::Failure;
 use rhumb::interrupt::Interrupt;
 use rhumb::settings::{Job, Settings, Sources};
@@ -136,6 +136,145 @@ fn commands_too_long_for_any_firmware_are_left_out_and_counted() {
     assert_eq!(converted.left_out, 1);
     assert!(text.contains("; left out: EXCLUDE_OBJECT_DEFINE"));
     assert!(text.lines().any(|line| line == "M106 S255"));
+}
+
+/// A program as Cura writes them: layers by number alone, absolute filament, fast `G0`, its own
+/// estimates, commands that we do not know.
+fn as_cura_writes() -> String {
+    let mut text = String::from(
+        ";FLAVOR:Marlin\n;TIME:321\n;Filament used: 0.1m\n;Layer height: 0.2\n;Generated with Cura\n\
+         M140 S60\nM190 S60\nM104 S200\nM109 S200\nM82 ;absolute extrusion mode\nM201 X500 Y500\n\
+         M205 X8.00 E5.00\nG28 ;Home\nG92 E0\nG92 E0\nG1 F1500 E-6.5\n;LAYER_COUNT:3\n",
+    );
+    let mut e = -6.5;
+    for layer in 0..3 {
+        let z = 0.3 + 0.2 * f64::from(layer);
+        let _ = write!(text, ";LAYER:{layer}\nM106 S{}\n", 85 * layer);
+        let _ =
+            write!(text, "G0 F6000 X90 Y90 Z{z:.1}\n;TYPE:WALL-OUTER\nG1 F1500 E{:.5}\n", e + 6.5);
+        e += 6.5;
+        for (k, (x, y)) in [(110, 90), (110, 110), (90, 110), (90, 90)].into_iter().enumerate() {
+            e += 0.7;
+            let speed = if k == 0 { " F1200" } else { "" };
+            let _ = writeln!(text, "G1{speed} X{x} Y{y} E{e:.5}");
+        }
+        e -= 6.5;
+        let _ = write!(text, ";TIME_ELAPSED:{}\nG1 F1500 E{e:.5}\n;MESH:NONMESH\n", 10 * layer);
+    }
+    text + "M140 S0\nM107\nG91 ;relative\nG1 Z5 F3000\nG90\nM82\nM104 S0\n;End of Gcode\n"
+}
+
+#[test]
+fn layers_that_are_only_numbered_get_their_heights_and_the_program_proves_sound() {
+    for printer in ["generic-polar", "klipper-polar", "core-r-theta"] {
+        let job = job(printer);
+        let (text, converted) = converted(&as_cura_writes(), &job, [100.0, 100.0]).unwrap();
+        let verdict = check(text.as_bytes(), &job, None, false, |_| {}).unwrap();
+        assert_eq!(verdict.findings, [], "{printer}");
+        assert_eq!(verdict.totals.layers.len(), 3);
+        assert_eq!(verdict.notes.iter().filter(|note| note.contains("converted")).count(), 1);
+        for block in
+            [";LAYER_CHANGE\n;Z:0.3\n;HEIGHT:0.3\n;LAYER:0", ";Z:0.7\n;HEIGHT:0.2\n;LAYER:2"]
+        {
+            assert!(text.contains(block), "{block}");
+        }
+        for kept in ["M201 X500 Y500", "M205 X8.00 E5.00", "M106 S85", ";TYPE:WALL-OUTER"] {
+            assert!(text.lines().any(|line| line == kept), "{kept}");
+        }
+        for gone in [";TIME", "G92 E0", "M82", "G91"] {
+            assert!(!text.lines().any(|line| line.starts_with(gone)), "{gone}");
+        }
+        assert!((converted.filament - (8.4 - 6.5)).abs() < 1e-9, "{}", converted.filament);
+    }
+}
+
+#[test]
+fn what_is_written_is_proved_on_its_way() {
+    let job = job("klipper-polar");
+    let request = Request {
+        name: "source.gcode",
+        origin: Vector2::new(100.0, 100.0),
+        job: &job,
+        made_at: "2026-01-31 at 12:00:00",
+    };
+    let source = square();
+    let mut out = Vec::new();
+    let (_, verdict) =
+        convert_checked(&request, source.as_bytes(), &mut out, &Interrupt::default()).unwrap();
+    assert_eq!(verdict.findings, []);
+    let (text, _) = converted(&source, &job, [100.0, 100.0]).unwrap();
+    assert!(out == text.as_bytes(), "the bytes are the same");
+    assert_eq!(verdict.totals.lines, text.lines().count());
+}
+
+#[test]
+fn the_middle_leaves_out_what_comes_before_the_first_layer() {
+    let purge = "M83\nG1 X2 Y10 Z0.3 F3000\nG1 Y190 E15\n";
+    let source = square().replace("G1 Z5 F600\n", &format!("G1 Z5 F600\n{purge}"));
+    let centre = middle(source.as_bytes(), "source.gcode").unwrap();
+    assert!((centre - Vector2::new(100.35, 100.0)).norm() < 1e-12, "{centre}");
+}
+
+#[test]
+fn any_length_of_program_gives_the_same_moves_as_its_parts() {
+    // More strokes than a batch holds, without a rest between them.
+    let mut source = String::from("M109 S210\nG28\nM83\nG1 X40 Y0 Z0.2 F6000\n");
+    for k in 1..=40_000 {
+        let angle = f64::from(k) * 0.05;
+        let radius = 40.0 - 30.0 * f64::from(k) / 40_000.0;
+        let _ =
+            writeln!(source, "G1 X{:.3} Y{:.3} E.05", radius * angle.cos(), radius * angle.sin());
+    }
+    source.push_str("M104 S0\n");
+    let job = job("generic-polar");
+    let (text, made) = converted(&source, &job, [0.0, 0.0]).unwrap();
+    assert_eq!(made.lines, source.lines().count());
+    assert!((made.filament - 2000.0).abs() < 1e-6);
+    let verdict = check(text.as_bytes(), &job, None, false, |_| {}).unwrap();
+    assert_eq!(verdict.findings, []);
+}
+
+#[test]
+fn commands_of_the_source_are_kept_whatever_they_look_like() {
+    let kept = [
+        "M862.3 P \"MK3S\" ; printer model check",
+        "M115 U3.13.2",
+        "G28 W ; home all without mesh bed level",
+        "G80",
+        "M900 K0.05",
+        "m204 s800",
+        "START_PRINT BED=60 TOOL={first}",
+        "T0",
+        "M84 X Y E",
+    ];
+    let source =
+        kept.join("\n") + "\nM109 S200\nG90 G21 G1 X20 Y0 Z.2 F3000\nM83\nG1 Y5 E.1\nM104 S0\n";
+    let job = job("generic-polar");
+    let (text, _) = converted(&source, &job, [0.0, 0.0]).unwrap();
+    for line in kept.map(|line| line.split(';').next().unwrap_or_default().trim()) {
+        assert!(text.lines().any(|kept| kept == line), "{line}: {text}");
+    }
+    let verdict = check(text.as_bytes(), &job, None, false, |_| {}).unwrap();
+    assert_eq!(verdict.findings, []);
+}
+
+#[test]
+fn a_macro_may_home_and_heat() {
+    let source = "START_PRINT BED_TEMP=60\nG1 X20 Y0 Z.2 F3000\nM83\nG1 Y5 E.1\nEND_PRINT\n";
+    for printer in ["klipper-polar", "generic-polar"] {
+        let job = job(printer);
+        let (text, _) = converted(source, &job, [0.0, 0.0]).unwrap();
+        let verdict = check(text.as_bytes(), &job, None, false, |_| {}).unwrap();
+        assert_eq!(verdict.findings, [], "{printer}");
+    }
+}
+
+#[test]
+fn a_circle_about_the_axis_stays_few_moves() {
+    let source = "G28\nM83\nG1 X30 Y0 Z0.2 F3000\nG3 X30 Y0 I-30 J0 E6 F1800\n";
+    let (text, _) = converted(source, &job("generic-polar"), [0.0, 0.0]).unwrap();
+    let laid = text.lines().filter(|line| line.starts_with("G1") && line.contains(" E")).count();
+    assert!((24..=32).contains(&laid), "{laid}");
 }
 
 #[test]

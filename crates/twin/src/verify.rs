@@ -84,6 +84,10 @@ impl Verdict {
     }
 }
 
+/// A comment that begins so names the program of which this one was made: its commands other than
+/// motion are kept as they were, and are not judged.
+pub const CONVERTED_FROM: &str = "converted from ";
+
 /// Judges a program while it is read.
 #[derive(Debug)]
 pub struct Verifier<'a> {
@@ -179,7 +183,7 @@ impl<'a> Verifier<'a> {
     pub fn finish(mut self) -> Verdict {
         let place = Place::line(self.replay.lines(), self.replay.layer());
         self.end_layer();
-        self.acceleration.rest(&mut self.findings);
+        self.rest();
         self.continuity.end(place, &mut self.findings);
         self.heat.end(place, &mut self.findings);
         self.flow.end(place, &mut self.findings);
@@ -193,6 +197,12 @@ impl<'a> Verifier<'a> {
             notes.push(
                 "speed, acceleration: the firmware turns these words into joints itself, so \
                  bed and carriage are not judged",
+            );
+        }
+        if self.text.has_kept() {
+            notes.push(
+                "commands: the program was converted; commands of the source that rhumb does not \
+                 know are kept as they are and were not judged",
             );
         }
         let thorough = self.watch.as_mut().map(|watch| watch.finish(&mut self.findings));
@@ -209,11 +219,15 @@ impl<'a> Verifier<'a> {
         let line = match read(text) {
             Ok(line) => line,
             Err(error) => {
-                self.text.unreadable(&error, place, &mut self.findings);
+                self.text.unreadable(text, &error, place, &mut self.findings);
                 self.replay.skip();
                 return None;
             }
         };
+        let is_mark = |comment: &str| comment.trim_start().starts_with(CONVERTED_FROM);
+        if line.comment.is_some_and(is_mark) {
+            self.text.is_converted();
+        }
         match &line.command {
             Some(command) => self.command(command, place),
             None => {
@@ -224,6 +238,10 @@ impl<'a> Verifier<'a> {
     }
 
     fn command(&mut self, command: &Command<'_>, place: Place) -> Option<Segment> {
+        if self.text.is_macro_of_source(command) {
+            self.modes.unknown();
+            self.heat.unknown();
+        }
         self.text.command(command, place, &mut self.findings);
         self.modes.command(command, place, &mut self.findings);
         let event = self.replay.follow_command(command);
@@ -238,7 +256,7 @@ impl<'a> Verifier<'a> {
                 return Some(segment);
             }
             Event::Layer(mark) => self.layer(mark),
-            Event::Rest => self.acceleration.rest(&mut self.findings),
+            Event::Rest => self.rest(),
             Event::Nozzle(heating) => {
                 self.wait(heating);
                 self.heat.nozzle(heating, place, &mut self.findings);
@@ -274,8 +292,12 @@ impl<'a> Verifier<'a> {
 
     fn wait(&mut self, heating: Heating) {
         if heating.waits {
-            self.acceleration.rest(&mut self.findings);
+            self.rest();
         }
+    }
+
+    fn rest(&mut self) {
+        self.acceleration.rest(&mut self.findings);
     }
 
     fn layer(&mut self, mark: LayerMark) {

@@ -1,7 +1,5 @@
 //! Numbers as programs want them: shortest fixed-point form, never an exponent, never `-0`.
 
-use std::io::Write;
-
 /// The powers of ten that [`quantum`] can ask for.
 const SCALES: [f64; 7] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
 
@@ -29,19 +27,32 @@ pub(crate) fn push_quantum(out: &mut Vec<u8>, count: i64, decimals: usize) {
     }
     let scale = 10_u64.pow(decimals as u32);
     let magnitude = count.unsigned_abs();
-    // Writing to a vector cannot fail.
-    let _ = write!(out, "{}", magnitude / scale);
+    push_whole(out, magnitude / scale, 1);
     let mut rest = magnitude % scale;
     if rest == 0 {
         return;
     }
-    out.push(b'.');
-    let mut place = scale / 10;
-    while rest > 0 {
-        out.push(b'0' + (rest / place) as u8);
-        rest %= place;
-        place /= 10;
+    let mut places = decimals;
+    while rest.is_multiple_of(10) {
+        rest /= 10;
+        places -= 1;
     }
+    out.push(b'.');
+    push_whole(out, rest, places);
+}
+
+/// Appends a whole number with at least so many digits.
+fn push_whole(out: &mut Vec<u8>, mut number: u64, least_digits: usize) {
+    /// Digits of the greatest `u64`.
+    const MOST_DIGITS: usize = 20;
+    let mut digits = [b'0'; MOST_DIGITS];
+    let mut first = MOST_DIGITS;
+    while number > 0 {
+        first -= 1;
+        digits[first] = b'0' + (number % 10) as u8;
+        number /= 10;
+    }
+    out.extend_from_slice(&digits[first.min(MOST_DIGITS - least_digits)..]);
 }
 
 /// Returns `value` with at most `decimals` places.

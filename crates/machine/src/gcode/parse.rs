@@ -123,13 +123,15 @@ pub fn parse_line(text: &str) -> Result<Line<'_>, SyntaxError> {
         return Ok(Line { command: Some(Command { code, values: [0.0; 26], given: 0 }), comment });
     }
     let code = words.code()?;
+    // Elsewhere a letter alone is a switch: G28 X Y, M84 E.
+    let needs_numbers = matches!(code, Code::Numbered(b'G', 0..=3 | 92, _));
     let mut command = Command { code, values: [0.0; 26], given: 0 };
     loop {
         words.skip_blanks();
         if words.peek().is_none() {
             return Ok(Line { command: Some(command), comment });
         }
-        let (letter, value) = words.next_word()?;
+        let (letter, value) = words.next_word_or_switch(!needs_numbers)?;
         let index = usize::from(letter - b'A');
         command.values[index] = value;
         command.given |= 1 << index;
@@ -243,26 +245,55 @@ impl Words<'_> {
     }
 
     fn next_word(&mut self) -> Result<(u8, f64), SyntaxError> {
+        self.next_word_or_switch(false)
+    }
+
+    /// A letter and its number; where a letter alone is allowed its number is zero.
+    fn next_word_or_switch(&mut self, may_be_alone: bool) -> Result<(u8, f64), SyntaxError> {
         let letter = self.letter()?;
+        if may_be_alone && self.peek().is_none_or(|c| c.is_ascii_whitespace()) {
+            return Ok((letter, 0.0));
+        }
         let start = self.at;
         if matches!(self.peek(), Some(b'+' | b'-')) {
             self.at += 1;
         }
+        let digits_start = self.at;
         let mut digits = self.digits();
+        let mut places = 0;
         if self.peek() == Some(b'.') {
             self.at += 1;
-            digits += self.digits();
+            places = self.digits();
+            digits += places;
         }
         if digits == 0 {
             return Err(self.error("a number is expected"));
         }
+        let word = &self.text[start..self.at];
+        if digits <= EXACT_DIGITS {
+            let magnitude = exact(&self.text[digits_start..self.at], places);
+            return Ok((letter, if word[0] == b'-' { -magnitude } else { magnitude }));
+        }
         // Only ASCII signs, digits and points: both conversions hold.
-        let number = std::str::from_utf8(&self.text[start..self.at])
+        let number = std::str::from_utf8(word)
             .ok()
             .and_then(|number| number.parse::<f64>().ok())
             .filter(|number| number.is_finite());
         number.map(|number| (letter, number)).ok_or(self.error("the number is too large"))
     }
+}
+
+/// Whole numbers with so many digits are exact in `f64`, as [`TENS`] are; so their quotient is the
+/// nearest number to the decimal.
+const EXACT_DIGITS: usize = 15;
+
+/// The number that at most [`EXACT_DIGITS`] digits, `places` of them after the point, stand for.
+fn exact(digits: &[u8], places: usize) -> f64 {
+    let whole = digits
+        .iter()
+        .filter(|byte| **byte != b'.')
+        .fold(0_u64, |whole, byte| 10 * whole + u64::from(byte - b'0'));
+    whole as f64 / TENS[places]
 }
 
 #[cfg(test)]
@@ -370,6 +401,31 @@ mod tests {
             }
             let (read, rest) = plain_number(text.as_bytes()).unwrap();
             assert_eq!((read, rest.len()), (text.parse().unwrap(), 0), "{text}");
+        }
+    }
+
+    #[test]
+    fn bare_letters_are_zero() {
+        assert_eq!(command("G28 X Y").word(b'Y'), Some(0.0));
+        assert_eq!(command("M84 X Y E").word(b'Z'), None);
+    }
+
+    #[test]
+    fn numbers_are_the_nearest_to_their_decimals() {
+        let mut state = 5_u64;
+        for _ in 0..20_000 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let whole = (state >> 20) % 10_u64.pow((state % 12) as u32 + 1);
+            let places = (state >> 50) as usize % 7;
+            let scale = 10_u64.pow(places as u32);
+            let sign = if state.is_multiple_of(3) { "-" } else { "" };
+            let text = if places == 0 {
+                format!("{sign}{whole}")
+            } else {
+                format!("{sign}{}.{:0places$}", whole / scale, whole % scale)
+            };
+            let word = command(&format!("G1 X{text}")).word(b'X').unwrap();
+            assert_eq!(word.to_bits(), text.parse::<f64>().unwrap().to_bits(), "{text}");
         }
     }
 

@@ -65,6 +65,7 @@ impl Resampler {
         self.push(Kind::Print, to, target, &mut legs).ok()?;
         let leg = legs.pop()?;
         let filament = strokes[..good].iter().map(|stroke| stroke.filament).sum();
+        let filament = self.with_owed(Kind::Print, filament, true);
         Some((good, Leg { filament, speed: strokes[0].speed, ..leg }))
     }
 
@@ -93,7 +94,9 @@ impl Resampler {
             .map(|(a, b)| (b.over_bed - a.over_bed).norm().hypot(b.z - a.z))
             .collect();
         let whole: f64 = lengths.iter().sum();
-        if (self.path_length(&to) - whole).abs() > LONG_MOVE_LENGTH * whole {
+        if (self.path_length(&to, self.alignment.part_from_joints(&to)) - whole).abs()
+            > LONG_MOVE_LENGTH * whole
+        {
             return false;
         }
         let mut done = 0.0;

@@ -5,11 +5,13 @@ use std::io::{BufRead, BufReader, BufWriter, Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector2;
+use twin::verify::Verdict;
 
 use super::{DONE, LOOK, display_name, say, say_json, settings};
 use crate::args::{Convert, Manner};
+use crate::check::{findings, refusal_of_converted};
 use crate::clock;
-use crate::convert::{Converted, Request, convert, middle};
+use crate::convert::{Converted, Request, convert, convert_checked, middle};
 use crate::failure::Failure;
 use crate::input;
 use crate::interrupt::Interrupt;
@@ -29,16 +31,26 @@ pub(super) fn run(arguments: &Convert, manner: &Manner) -> Result<u8, Failure> {
     let target = target(arguments);
     let mut out = Output::create(&target, &[arguments.program.as_path()])?;
     let request = Request { name: &name, origin, job: &job, made_at: &clock::now() };
-    let converted = {
+    let (converted, verdict) = {
         let mut text = BufWriter::with_capacity(1 << 16, out.file());
-        let converted = convert(&request, source.reader()?, &mut text, &interrupt)?;
+        let done = if arguments.no_verify {
+            (convert(&request, source.reader()?, &mut text, &interrupt)?, None)
+        } else {
+            let (converted, verdict) =
+                convert_checked(&request, source.reader()?, &mut text, &interrupt)?;
+            (converted, Some(verdict))
+        };
         text.flush().map_err(|error| output::failed(&target, &error))?;
-        converted
+        done
     };
     interrupt.check()?;
+    if let Some(failure) = verdict.as_ref().and_then(refusal_of_converted) {
+        return Err(failure);
+    }
     out.commit()?;
-    tell(&converted, &origin, &target, manner)?;
-    Ok(if converted.left_out > 0 { LOOK } else { DONE })
+    tell(&converted, verdict.as_ref(), &origin, &target, manner)?;
+    let is_clean = verdict.is_none_or(|verdict| verdict.findings.is_empty());
+    Ok(if is_clean && converted.left_out == 0 { DONE } else { LOOK })
 }
 
 /// A program that can be read from its begin more than once.
@@ -54,7 +66,7 @@ impl Source {
         Ok(if is_file { Self::File(path.to_owned()) } else { Self::Bytes(input::read(path)?) })
     }
 
-    fn reader(&self) -> Result<Box<dyn BufRead + '_>, Failure> {
+    fn reader(&self) -> Result<Box<dyn BufRead + Send + '_>, Failure> {
         match self {
             Self::File(path) => {
                 let file = File::open(path).map_err(|error| {
@@ -84,6 +96,7 @@ fn target(arguments: &Convert) -> PathBuf {
 
 fn tell(
     converted: &Converted,
+    verdict: Option<&Verdict>,
     origin: &Vector2<f64>,
     target: &Path,
     manner: &Manner,
@@ -100,6 +113,7 @@ fn tell(
             "time_s": time,
             "left_out": left_out,
             "origin_mm": [origin.x, origin.y],
+            "verify": verdict.map(|verdict| serde_json::json!({"findings": findings(verdict)})),
         }));
     }
     let mut text = format!(
@@ -111,6 +125,9 @@ fn tell(
         text.push_str(&format!(
             "{left_out} commands are longer than firmwares read and were left out\n"
         ));
+    }
+    for finding in verdict.iter().flat_map(|verdict| &verdict.findings) {
+        text.push_str(&format!("{finding}\n"));
     }
     text.push_str(&format!("written  {}\n", display_name(target)));
     say(&text)

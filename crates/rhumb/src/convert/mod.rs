@@ -3,28 +3,39 @@
 //! The source is read line by line, its ways gathered in batches, and each batch planned as our own
 //! layers are: cut to the chord tolerance, clear of the axis, at speeds that the axes can keep, with
 //! the calibration of the machine in every coordinate. Everything else keeps its place between
-//! them. Memory holds one batch, whatever the length of the program.
+//! them. Reading, planning and writing run side by side, a few batches apart, and the bytes are the
+//! same whichever is faster. Memory holds these batches, whatever the length of the program.
 
 mod arc;
+mod batch;
+mod comment;
+mod layers;
+mod middle;
 mod reader;
 mod segments;
+mod tee;
 
-use std::io::{BufRead, Read, Write};
+use std::io::{BufRead, Write};
 use std::path::Path;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
 
 use machine::gcode::{Emitter, MOST_COLUMNS, printable};
 use machine::program::Step;
-use nalgebra::{Point2, Point3, Vector2};
-use plan::follow::Follower;
+use nalgebra::Vector2;
+use plan::follow::{Followed, Follower};
 use plan::resample::ResampleParams;
-use plan::route::{Kind, Stroke};
+use twin::verify::Verdict;
 
+use crate::check::check;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::output;
 use crate::program_text::duration;
 use crate::settings::Job;
-use reader::{Meaning, Reader};
+use batch::{Batch, Batches, Between};
+pub use middle::middle;
+use tee::{Chunks, Tee};
 
 pub use segments::{Unreadable, segments};
 
@@ -55,17 +66,8 @@ pub struct Converted {
     pub left_out: usize,
 }
 
-/// Strokes that are planned at once, at least; a batch ends where the nozzle stands still anyhow.
-const BATCH: usize = 2048;
-
-/// Strokes after which a batch ends wherever it is.
-const LONGEST_BATCH: usize = 1 << 15;
-
-/// Other lines after which a batch ends: a program may have no strokes at all.
-const MOST_OTHERS: usize = 1 << 12;
-
-/// Longest line of a source, bytes.
-const LONGEST_LINE: u64 = 1 << 20;
+/// Batches on their way from one part of the work to the next.
+const BATCHES_AHEAD: usize = 4;
 
 /// Share of the chord tolerance for cutting arcs into lines; the lines have the rest.
 const ARC_SHARE: f64 = 0.25;
@@ -78,102 +80,128 @@ const ARC_SHARE: f64 = 0.25;
 /// reach, or what reading and writing report.
 pub fn convert(
     request: &Request<'_>,
-    mut source: impl BufRead,
+    source: impl BufRead + Send,
     out: &mut dyn Write,
     interrupt: &Interrupt,
 ) -> Result<Converted, Failure> {
-    let mut conversion = Conversion::new(request, out);
-    conversion.head(request).map_err(written)?;
-    let mut line = Vec::new();
-    loop {
-        line.clear();
-        let count = Read::take(&mut source, LONGEST_LINE)
-            .read_until(b'\n', &mut line)
-            .map_err(|error| Failure::new("Unreadable", format!("{}: {error}", request.name)))?;
-        if count == 0 {
-            return conversion.finish();
+    let job = request.job;
+    let chord = job.plan.resample.chord;
+    let home = job.printer.alignment.part_from_joints(&job.printer.home);
+    let mut batches = Batches::new(source, request.name, request.origin, home, chord * ARC_SHARE);
+    let mut planning = Planning::new(request, chord * (1.0 - ARC_SHARE));
+    let mut writing = Writing::new(request, out);
+    writing.head(request).map_err(written)?;
+    thread::scope(|scope| {
+        let (to_plan, batches_read) = sync_channel(BATCHES_AHEAD);
+        let (to_write, batches_planned) = sync_channel(BATCHES_AHEAD);
+        scope.spawn(move || read(&mut batches, &to_plan, interrupt));
+        scope.spawn(move || planning.run(&batches_read, &to_write));
+        for planned in batches_planned {
+            writing.batch(planned?)?;
         }
-        conversion.line(&String::from_utf8_lossy(&line))?;
-        if conversion.is_full() {
-            interrupt.check()?;
-            conversion.flush()?;
-        }
-    }
+        writing.finish()
+    })
 }
 
-/// Returns the middle of all that a program prints, mm: where a part usually belongs on the axis.
+/// Converts a program, and proves what is written on a model of the machine while it is written.
 ///
 /// # Errors
 ///
-/// As [`convert`]; `NothingToPrint` when nothing is printed.
-pub fn middle(mut source: impl BufRead, name: &str) -> Result<Vector2<f64>, Failure> {
-    let mut reader = Reader::new(Vector2::zeros(), Point3::origin(), 0.1);
-    let (mut number, mut line, mut strokes) = (0, Vec::new(), Vec::new());
-    let mut bounds: Option<[Point2<f64>; 2]> = None;
+/// As [`convert`].
+pub fn convert_checked(
+    request: &Request<'_>,
+    source: impl BufRead + Send,
+    out: &mut dyn Write,
+    interrupt: &Interrupt,
+) -> Result<(Converted, Verdict), Failure> {
+    thread::scope(|scope| {
+        let (sender, receiver) = sync_channel(BATCHES_AHEAD);
+        let job = request.job;
+        let verdict = scope.spawn(move || check(Chunks::new(receiver), job, None, false, |_| {}));
+        let mut tee = Tee::new(out, sender);
+        let converted = convert(request, source, &mut tee, interrupt);
+        drop(tee);
+        let verdict = verdict.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        Ok((converted?, verdict?))
+    })
+}
+
+/// Reads batches until the source ends, or whoever plans them has stopped.
+fn read<R: BufRead>(
+    batches: &mut Batches<'_, R>,
+    to_plan: &SyncSender<Result<Batch, Failure>>,
+    interrupt: &Interrupt,
+) {
     loop {
-        line.clear();
-        let count = Read::take(&mut source, LONGEST_LINE)
-            .read_until(b'\n', &mut line)
-            .map_err(|error| Failure::new("Unreadable", format!("{name}: {error}")))?;
-        if count == 0 {
-            break;
-        }
-        number += 1;
-        let text = String::from_utf8_lossy(&line);
-        let (code, _) = without_comment(&text);
-        strokes.clear();
-        reader.line(&code, &mut strokes).map_err(|error| unreadable(name, number, &error))?;
-        for stroke in strokes.iter().filter(|stroke| stroke.kind == Kind::Print) {
-            let p = stroke.to.xy();
-            let [low, high] = bounds.unwrap_or([p, p]);
-            bounds = Some([low.inf(&p), high.sup(&p)]);
+        let next = interrupt.check().and_then(|()| batches.next());
+        let Some(message) = next.transpose() else { return };
+        let is_last = message.is_err();
+        if to_plan.send(message).is_err() || is_last {
+            return;
         }
     }
-    let [low, high] =
-        bounds.ok_or_else(|| Failure::new("NothingToPrint", format!("{name} lays no material")))?;
-    Ok(nalgebra::center(&low, &high).coords)
 }
 
-/// What stands between strokes.
-enum Between {
-    /// A command of the source.
-    Command(String),
-    /// The same, which homes the machine.
-    Home(String),
-    Comment(String),
+/// A batch with its moves.
+struct Planned {
+    batch: Batch,
+    followed: Followed,
+    /// The time estimated so far, s.
+    time: f64,
 }
 
-struct Conversion<'a> {
-    name: &'a str,
-    dialect: &'static str,
-    home: Point3<f64>,
-    reader: Reader,
+struct Planning {
+    name: String,
     follower: Follower,
+}
+
+impl Planning {
+    fn new(request: &Request<'_>, chord: f64) -> Self {
+        let job = request.job;
+        let params = ResampleParams { chord, ..job.plan.resample };
+        Self { name: request.name.to_owned(), follower: Follower::new(&job.printer, params) }
+    }
+
+    /// Plans batches until none comes, one cannot be planned, or whoever writes them has stopped.
+    fn run(
+        &mut self,
+        batches: &Receiver<Result<Batch, Failure>>,
+        to_write: &SyncSender<Result<Planned, Failure>>,
+    ) {
+        for batch in batches {
+            let planned = batch.and_then(|batch| self.plan(batch));
+            let is_last = planned.is_err();
+            if to_write.send(planned).is_err() || is_last {
+                return;
+            }
+        }
+    }
+
+    fn plan(&mut self, batch: Batch) -> Result<Planned, Failure> {
+        let followed = self.follower.follow(&batch.strokes).map_err(|error| {
+            let line = batch.lines_of[error.stroke];
+            Failure::new("OutOfEnvelope", format!("{}, line {line}: {error}", self.name))
+                .hint("say with --origin X,Y which place of the bed is the axis, or --origin auto")
+        })?;
+        if batch.between.iter().any(|(_, between)| matches!(between, Between::Home(_))) {
+            self.follower.homed();
+        }
+        Ok(Planned { batch, followed, time: self.follower.time() })
+    }
+}
+
+struct Writing<'a> {
+    dialect: &'static str,
     text: Emitter<&'a mut dyn Write>,
-    strokes: Vec<Stroke>,
-    /// The line of the source that each stroke comes from.
-    lines_of: Vec<usize>,
-    /// Lines that come before the stroke with this index.
-    between: Vec<(usize, Between)>,
     converted: Converted,
 }
 
-impl<'a> Conversion<'a> {
-    fn new(request: &Request<'a>, out: &'a mut dyn Write) -> Self {
+impl<'a> Writing<'a> {
+    fn new(request: &Request<'_>, out: &'a mut dyn Write) -> Self {
         let job = request.job;
-        let home = job.printer.alignment.part_from_joints(&job.printer.home);
-        let chord = job.plan.resample.chord;
-        let params = ResampleParams { chord: chord * (1.0 - ARC_SHARE), ..job.plan.resample };
         Self {
-            name: request.name,
             dialect: job.dialect.name,
-            home,
-            reader: Reader::new(request.origin, home, chord * ARC_SHARE),
-            follower: Follower::new(&job.printer, params),
             text: Emitter::for_printer(out, job.dialect, &job.printer),
-            strokes: Vec::with_capacity(BATCH),
-            lines_of: Vec::with_capacity(BATCH),
-            between: Vec::new(),
             converted: Converted::default(),
         }
     }
@@ -182,104 +210,55 @@ impl<'a> Conversion<'a> {
         let version = env!("CARGO_PKG_VERSION");
         self.text.comment(&format!("generated by rhumb {version} on {}", request.made_at))?;
         let name: String = printable(request.name).chars().take(60).collect();
-        self.text.comment(&format!("converted from {name}"))?;
+        self.text.comment(&format!("{}{name}", twin::verify::CONVERTED_FROM))?;
         ["G21", "G90", "M83"].iter().try_for_each(|line| self.text.text(line))
     }
 
-    fn line(&mut self, text: &str) -> Result<(), Failure> {
-        self.converted.lines += 1;
-        let number = self.converted.lines;
-        let (code, comment) = without_comment(text);
-        if !code.trim().is_empty() {
-            let first = self.strokes.len();
-            let meaning = self
-                .reader
-                .line(&code, &mut self.strokes)
-                .map_err(|error| unreadable(self.name, number, &error))?;
-            self.lines_of.resize(self.strokes.len(), number);
-            match meaning {
-                Meaning::Motion | Meaning::Absorbed => {}
-                Meaning::Other(line) => {
-                    self.between.push((first, Between::Command(line.to_owned())));
-                }
-                Meaning::Home(line) => {
-                    self.between.push((first, Between::Home(line.to_owned())));
-                    self.flush()?;
-                }
-            }
-        }
-        // Remarks on single moves have no place where moves are cut to pieces, and what the source
-        // estimated is not true of this machine.
-        let is_kept = |comment: &String| {
-            code.trim().is_empty() && !comment.contains("estimated printing time")
-        };
-        if let Some(comment) = comment.filter(is_kept) {
-            self.between.push((self.strokes.len(), Between::Comment(comment)));
-        }
-        Ok(())
-    }
-
-    fn is_full(&self) -> bool {
-        let rests = self.strokes.last().is_some_and(|stroke| stroke.kind == Kind::Filament);
-        self.strokes.len() >= LONGEST_BATCH
-            || self.strokes.len() >= BATCH && rests
-            || self.between.len() >= MOST_OTHERS
-    }
-
-    /// Plans and writes the batch.
-    fn flush(&mut self) -> Result<(), Failure> {
-        let groups = self.follower.follow(&self.strokes).map_err(|error| {
-            let line = self.lines_of[error.stroke];
-            Failure::new("OutOfEnvelope", format!("{}, line {line}: {error}", self.name))
-                .hint("say with --origin X,Y which place of the bed is the axis, or --origin auto")
-        })?;
-        let between = std::mem::take(&mut self.between);
-        let mut others = between.into_iter().peekable();
-        for (index, moves) in groups.iter().enumerate() {
+    fn batch(&mut self, planned: Planned) -> Result<(), Failure> {
+        let Planned { batch, followed: Followed { moves, counts }, time } = planned;
+        let mut others = batch.between.into_iter().peekable();
+        let mut moves = moves.into_iter();
+        for (index, count) in counts.into_iter().enumerate() {
             while let Some((_, other)) = others.next_if(|(before, _)| *before <= index) {
                 self.other(other)?;
             }
-            for motion in moves {
+            for motion in moves.by_ref().take(count) {
                 self.converted.filament += motion.filament;
-                self.text.step(&Step::Move(*motion)).map_err(written)?;
+                self.text.step(&Step::Move(motion)).map_err(written)?;
             }
         }
         for (_, other) in others {
             self.other(other)?;
         }
-        self.strokes.clear();
-        self.lines_of.clear();
-        Ok(())
+        self.converted.lines = batch.lines;
+        self.converted.time = time;
+        // The machine stands still here; not every source says where its layers begin.
+        self.text.recount().map_err(written)
     }
 
     fn other(&mut self, other: Between) -> Result<(), Failure> {
         match other {
             Between::Comment(comment) => {
                 self.text.text(&format!(";{comment}")).map_err(written)?;
-                if comment == "LAYER_CHANGE" || comment.starts_with("LAYER:") {
+                if comment == "LAYER_CHANGE" {
                     self.text.recount().map_err(written)?;
                 }
                 Ok(())
             }
+            Between::Layer(layer) => self.text.step(&Step::Layer(layer)).map_err(written),
             // Cut short it would be another command.
             Between::Command(line) if line.len() > MOST_COLUMNS || !line.is_ascii() => {
                 self.converted.left_out += 1;
                 let start: String = line.chars().take(40).collect();
                 self.text.comment(&format!("left out: {start}...")).map_err(written)
             }
-            Between::Command(line) => self.text.step(&Step::Custom(line)).map_err(written),
-            Between::Home(line) => {
-                self.text.step(&Step::Custom(line)).map_err(written)?;
-                self.reader.homed(self.home);
-                self.follower.homed();
-                Ok(())
+            Between::Command(line) | Between::Home(line) => {
+                self.text.step(&Step::Custom(line)).map_err(written)
             }
         }
     }
 
     fn finish(mut self) -> Result<Converted, Failure> {
-        self.flush()?;
-        self.converted.time = self.follower.time();
         let time = duration(self.converted.time);
         self.text
             .comment(&format!("estimated printing time (normal mode) = {time}"))
@@ -294,43 +273,4 @@ impl<'a> Conversion<'a> {
 #[expect(clippy::needless_pass_by_value, reason = "the shape that map_err calls")]
 fn written(error: std::io::Error) -> Failure {
     output::failed(Path::new("program"), &error)
-}
-
-fn unreadable(name: &str, line: usize, error: &reader::ReadError) -> Failure {
-    Failure::new("GcodeSyntax", format!("{name}, line {line}: {error}"))
-}
-
-/// Takes a line apart: what comes before `;` or stands outside of brackets, and the rest.
-fn without_comment(line: &str) -> (String, Option<String>) {
-    let line = line.trim_end();
-    let (code, comment) = match line.split_once(';') {
-        Some((code, comment)) => (code, Some(comment.to_owned())),
-        None => (line, None),
-    };
-    // A message may have brackets of its own.
-    let is_words = code.trim_start().starts_with(['G', 'g', 'N', 'n', 'X', 'Y', 'Z', '(']);
-    let Some((before, rest)) = code.split_once('(').filter(|_| is_words) else {
-        return (code.to_owned(), comment);
-    };
-    let (inside, after) = rest.split_once(')').unwrap_or((rest, ""));
-    (format!("{before} {after}"), comment.or_else(|| Some(format!(" {inside}"))))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn both_kinds_of_comments() {
-        let taken = |line: &str| {
-            let (code, comment) = without_comment(line);
-            (code.trim().to_owned(), comment)
-        };
-        let some = |text: &str| Some(text.to_owned());
-        assert_eq!(taken("G1 X5 ; right\r\n"), ("G1 X5".into(), some(" right")));
-        assert_eq!(taken("G1 (right) X5\n"), ("G1   X5".into(), some(" right")));
-        assert_eq!(taken("(only)"), (String::new(), some(" only")));
-        assert_eq!(taken("M117 a (b)"), ("M117 a (b)".into(), None));
-        assert_eq!(taken(";TYPE:Perimeter"), (String::new(), some("TYPE:Perimeter")));
-    }
 }

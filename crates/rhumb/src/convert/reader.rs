@@ -47,9 +47,9 @@ pub(super) enum ReadError {
     /// Arcs outside of the plane of the bed.
     #[error("arcs outside of the xy plane (G18, G19) are not understood")]
     OtherPlane,
-    /// No speed was given before the first motion.
-    #[error("motion before any F")]
-    NoSpeed,
+    /// A curve or a meaning of `F` that no polar firmware has.
+    #[error("{0} is not understood")]
+    Foreign(&'static str),
 }
 
 /// Reads lines; remembers the state that they build on.
@@ -76,6 +76,9 @@ pub(super) struct Reader {
     arc_tolerance: f64,
 }
 
+/// The speed before the first `F`, mm/s: that of Marlin and Klipper.
+const FIRST_SPEED_MM_S: f64 = 25.0;
+
 /// Filament moves alone in pieces shorter than this, mm: Klipper refuses 50.
 const LONGEST_FILAMENT_MM: f64 = 49.0;
 
@@ -91,7 +94,7 @@ impl Reader {
             filament_is_relative: false,
             filament_mode_is_relative: false,
             unit: 1.0,
-            speed: 0.0,
+            speed: FIRST_SPEED_MM_S,
             motion: 1,
             arc_tolerance,
         }
@@ -103,13 +106,13 @@ impl Reader {
         self.offset = Vector3::new(self.origin.x, self.origin.y, 0.0);
     }
 
-    /// Reads a line without its comment and appends the strokes that it asks for.
+    /// Reads one of the [`commands`] of a line and appends the strokes that it asks for.
     pub(super) fn line<'a>(
         &mut self,
         code: &'a str,
         strokes: &mut Vec<Stroke>,
     ) -> Result<Meaning<'a>, ReadError> {
-        let code = numbered(code)?;
+        let code = code.trim();
         let first = code.bytes().next().unwrap_or(b' ').to_ascii_uppercase();
         let second = code.as_bytes().get(1).copied().unwrap_or(b' ');
         let is_word = second.is_ascii_digit() || b"+-. ".contains(&second);
@@ -161,12 +164,12 @@ impl Reader {
                 return Ok(Meaning::Absorbed);
             }
             28 => return Ok(Meaning::Home(code)),
+            5 => return Err(ReadError::Foreign("the curve G5")),
+            93 => return Err(ReadError::Foreign("inverse time (G93)")),
+            95 => return Err(ReadError::Foreign("feed per turn (G95)")),
             _ => return Ok(Meaning::Other(code)),
         }
-        // Some write a mode and a motion in one line: G90 G1 X10.
-        if let Some(motion @ (0.0 | 1.0 | 2.0 | 3.0)) = command.word(b'G') {
-            self.motion = motion as u32;
-        } else if number > 3 {
+        if number > 3 {
             return Ok(Meaning::Absorbed);
         }
         self.motion(command, strokes).map(|()| Meaning::Motion)
@@ -197,9 +200,6 @@ impl Reader {
         if to == self.at && filament == 0.0 && !is_arc {
             return Ok(());
         }
-        if self.speed == 0.0 {
-            return Err(ReadError::NoSpeed);
-        }
         if !is_arc {
             self.straight(to, filament, strokes);
             return Ok(());
@@ -216,8 +216,12 @@ impl Reader {
         };
         let points = arc.points(self.arc_tolerance).ok_or(ReadError::NoArc)?;
         let share = filament / points.len() as f64;
-        for point in points {
+        for (k, point) in points.into_iter().enumerate() {
             self.straight(point, share, strokes);
+            // The pieces of an arc may become one move again.
+            if let Some(piece) = strokes.last_mut().filter(|_| k > 0) {
+                piece.continues = piece.kind == Kind::Print;
+            }
         }
         Ok(())
     }
@@ -265,6 +269,30 @@ impl Reader {
     }
 }
 
+/// Returns the commands of a line, which may have several: `G90 G21 G1 X10`. What follows another
+/// letter is one command, whatever it holds. Line number and checksum are taken off.
+pub(super) fn commands(code: &str) -> Result<impl Iterator<Item = &str>, ReadError> {
+    let code = numbered(code)?;
+    let bytes = code.as_bytes();
+    let begins = |k: usize| {
+        matches!(bytes[k], b'G' | b'g' | b'M' | b'm')
+            && bytes.get(k + 1).is_some_and(u8::is_ascii_digit)
+    };
+    let may_split = !bytes.is_empty() && begins(0) && matches!(bytes[0], b'G' | b'g');
+    let mut rest = 0;
+    Ok(std::iter::from_fn(move || {
+        if rest >= bytes.len() {
+            return None;
+        }
+        let next = (rest + 1..bytes.len()).find(|&k| may_split && begins(k));
+        let end = next.unwrap_or(bytes.len());
+        // ASCII letters begin characters.
+        let command = &code[rest..end];
+        rest = end;
+        Some(command)
+    }))
+}
+
 /// Takes off line number and checksum.
 fn numbered(code: &str) -> Result<&str, ReadError> {
     let code = code.trim();
@@ -295,8 +323,10 @@ mod tests {
         let mut reader = Reader::new(Vector2::new(100.0, 100.0), home, 0.001);
         let (mut strokes, mut others) = (Vec::new(), Vec::new());
         for line in text.lines() {
-            if let Meaning::Other(line) = reader.line(line, &mut strokes).unwrap() {
-                others.push(line.to_owned());
+            for command in commands(line).unwrap() {
+                if let Meaning::Other(line) = reader.line(command, &mut strokes).unwrap() {
+                    others.push(line.to_owned());
+                }
             }
         }
         (strokes, others)
@@ -345,8 +375,7 @@ mod tests {
                 [1.0, 0.0, 0.0],
             ]
         );
-        let mut reader = Reader::new(Vector2::zeros(), Point3::origin(), 0.001);
-        let wrong = reader.line("N3 G1 X100 Y100*97", &mut Vec::new());
+        let wrong = commands("N3 G1 X100 Y100*97").map(Iterator::count);
         assert_eq!(wrong, Err(ReadError::Checksum { given: 97, found: 42 }));
     }
 
@@ -377,9 +406,27 @@ mod tests {
     fn faults_are_named() {
         let mut reader = Reader::new(Vector2::zeros(), Point3::origin(), 0.001);
         let mut line = |text: &'static str| reader.line(text, &mut Vec::new());
-        assert_eq!(line("G1 X5"), Err(ReadError::NoSpeed));
         assert!(matches!(line("G1 X5 F"), Err(ReadError::Syntax(_))));
         assert_eq!(line("G2 X5 Y5 F100 I3 J9"), Err(ReadError::NoArc));
         assert_eq!(line("G18"), Err(ReadError::OtherPlane));
+        assert_eq!(line("G5 X5 Y5 I1 J1 P1 Q1"), Err(ReadError::Foreign("the curve G5")));
+        assert!(matches!(line("G93"), Err(ReadError::Foreign(_))));
+    }
+
+    #[test]
+    fn several_commands_in_a_line() {
+        let parts = |line: &'static str| commands(line).unwrap().map(str::trim).collect::<Vec<_>>();
+        assert_eq!(parts("G90 G21 G1 X10 F600"), ["G90", "G21", "G1 X10 F600"]);
+        assert_eq!(parts("N7 G90 G1 X5"), ["G90", "G1 X5"]);
+        assert_eq!(parts("g91g1x5"), ["g91", "g1x5"]);
+        assert_eq!(parts("M117 Go G1 X5"), ["M117 Go G1 X5"]);
+        assert_eq!(parts("SET_PIN PIN=M1"), ["SET_PIN PIN=M1"]);
+        assert_eq!(parts("G1 X5 M106"), ["G1 X5", "M106"]);
+        assert_eq!(parts(" "), [] as [&str; 0]);
+    }
+
+    #[test]
+    fn the_first_speed_is_that_of_firmwares() {
+        assert_eq!(read("G1 X110").0[0].speed, 25.0);
     }
 }

@@ -11,8 +11,8 @@ use plan::route::Stroke;
 use twin::curve::Curve;
 use twin::segment::Segment;
 
+use super::comment::without_comment;
 use super::reader::Reader;
-use super::without_comment;
 
 /// How far the lines that stand for an arc may lie from it, mm.
 const ARC_TOLERANCE: f64 = 0.02;

@@ -50,6 +50,11 @@ impl Heat {
         range("the bed", heating.target, self.bed_max, place, findings);
     }
 
+    /// Something was commanded of which nobody knows whether it heats or cools.
+    pub(crate) fn unknown(&mut self) {
+        (self.certain, self.nozzle, self.bed) = (f64::INFINITY, 0.0, 0.0);
+    }
+
     pub(crate) fn segment(&mut self, segment: &Segment, findings: &mut Findings) {
         if segment.filament > 0.0 && exceeds(self.extrudes_from, self.certain) {
             let (is, least) = (self.certain, self.extrudes_from);

@@ -21,6 +21,11 @@ pub(crate) struct Modes {
 }
 
 impl Modes {
+    /// Something was commanded of which nobody knows whether it homes.
+    pub(crate) fn unknown(&mut self) {
+        self.homed = true;
+    }
+
     /// Takes note of a command.
     pub(crate) fn command(&mut self, command: &Command<'_>, place: Place, findings: &mut Findings) {
         match command.code {

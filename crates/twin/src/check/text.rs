@@ -31,13 +31,33 @@ const MACHINE: [u32; 12] = [18, 73, 83, 84, 104, 106, 107, 109, 117, 140, 190, 4
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Text {
     dialect: Dialect,
+    /// Whether all but the motion comes from another program.
+    is_converted: bool,
+    /// Whether such a command was seen.
+    has_kept: bool,
 }
 
 impl Text {
     /// Returns the check for programs in this dialect.
     #[must_use]
     pub(crate) fn new(dialect: Dialect) -> Self {
-        Self { dialect }
+        Self { dialect, is_converted: false, has_kept: false }
+    }
+
+    /// What is not motion comes from another program from here on: it is as its author wrote it, and
+    /// is not judged.
+    pub(crate) fn is_converted(&mut self) {
+        self.is_converted = true;
+    }
+
+    /// Returns whether a command is a macro of another program's author.
+    pub(crate) fn is_macro_of_source(&self, command: &Command<'_>) -> bool {
+        self.is_converted && matches!(command.code, Code::Named(_))
+    }
+
+    /// Returns whether there was a command that was not judged.
+    pub(crate) fn has_kept(&self) -> bool {
+        self.has_kept
     }
 
     /// Judges the characters of a line.
@@ -59,20 +79,35 @@ impl Text {
             findings.error(NAME, place, (1.0, 0.0), || "the line ends in a blank".into());
         }
         let code = line.split(|&byte| byte == b';').next().unwrap_or_default();
-        if !code.is_empty() {
+        let is_kept = self.is_converted && !code.starts_with(b"G1 ");
+        if !code.is_empty() && !is_kept {
             words(code, place, findings);
         }
     }
 
     /// Reports a line that is not a command.
-    pub(crate) fn unreadable(&self, error: &SyntaxError, place: Place, findings: &mut Findings) {
+    pub(crate) fn unreadable(
+        &mut self,
+        text: &str,
+        error: &SyntaxError,
+        place: Place,
+        findings: &mut Findings,
+    ) {
+        if self.is_converted && !text.starts_with("G1 ") {
+            self.has_kept = true;
+            return;
+        }
         findings.error(NAME, place, (error.column as f64, 0.0), || {
             format!("the line is not a command: column {}, {}", error.column, error.what)
         });
     }
 
     /// Judges a command.
-    pub(crate) fn command(&self, command: &Command<'_>, place: Place, findings: &mut Findings) {
+    pub(crate) fn command(&mut self, command: &Command<'_>, place: Place, findings: &mut Findings) {
+        if self.is_converted && !is_motion(command.code) && !is_on_list(command.code) {
+            self.has_kept = true;
+            return;
+        }
         match command.code {
             Code::Numbered(b'G', 1, 0) => self.motion(command, place, findings),
             Code::Numbered(b'G', number @ (0 | 2 | 3 | 5), 0) => {
@@ -81,8 +116,7 @@ impl Text {
                 });
             }
             Code::Numbered(b'G', 92, 0) => self.origin(command, place, findings),
-            Code::Numbered(b'G', number, 0) if GENERAL.contains(&number) => {}
-            Code::Numbered(b'M', number, 0) if MACHINE.contains(&number) => {}
+            code if is_on_list(code) => {}
             Code::Numbered(letter, number, part) => {
                 findings.error(NAME, place, (f64::from(number), 0.0), || {
                     let part = if part == 0 { String::new() } else { format!(".{part}") };
@@ -142,6 +176,18 @@ impl Text {
             });
         }
     }
+}
+
+fn is_on_list(code: Code<'_>) -> bool {
+    match code {
+        Code::Numbered(b'G', number, 0) => GENERAL.contains(&number),
+        Code::Numbered(b'M', number, 0) => MACHINE.contains(&number),
+        _ => false,
+    }
+}
+
+fn is_motion(code: Code<'_>) -> bool {
+    matches!(code, Code::Numbered(b'G', 0 | 1 | 2 | 3 | 5, _))
 }
 
 /// Judges the words of a command as they are spelt.
@@ -223,7 +269,11 @@ mod tests {
     use machine::gcode::dialect::{CARTESIAN, POLAR};
 
     fn found(dialect: Dialect, line: &str) -> Vec<String> {
-        let (check, place) = (Text::new(dialect), Place::line(1, None));
+        found_by(Text::new(dialect), line)
+    }
+
+    fn found_by(mut check: Text, line: &str) -> Vec<String> {
+        let place = Place::line(1, None);
         let mut findings = Findings::default();
         check.characters(line.as_bytes(), place, &mut findings);
         match read(line) {
@@ -232,7 +282,7 @@ mod tests {
                     check.command(command, place, &mut findings);
                 }
             }
-            Err(error) => check.unreadable(&error, place, &mut findings),
+            Err(error) => check.unreadable(line, &error, place, &mut findings),
         }
         findings.kept().iter().map(|finding| finding.message.clone()).collect()
     }
@@ -254,6 +304,20 @@ mod tests {
             assert_eq!(found(POLAR, line), Vec::<String>::new(), "{line}");
         }
         assert!(found(CARTESIAN, "G1 X0 Y-3.25 E0.1").is_empty());
+    }
+
+    #[test]
+    fn commands_of_another_program_are_not_judged_but_motion_is() {
+        let mut check = Text::new(POLAR);
+        check.is_converted();
+        for line in
+            ["M204 P800", "T0", "m73 p5 r.5", "START_PRINT BED=60", "M862.3 P \"x\"", "G28 W"]
+        {
+            assert_eq!(found_by(check, line), Vec::<String>::new(), "{line}");
+        }
+        for line in ["G0 R5 T3", "G2 R5 T3 I1 J1", "G1 R5", "G1 R-0 T3", "G1 E50", "G92 X5"] {
+            assert_eq!(found_by(check, line).len(), 1, "{line}");
+        }
     }
 
     #[test]
