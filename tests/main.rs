@@ -27,6 +27,7 @@ mod slice;
 mod text;
 mod threads;
 mod thumbnail;
+mod time;
 mod verify;
 mod volume;
 mod walls;

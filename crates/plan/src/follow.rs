@@ -3,6 +3,7 @@
 //! The same subdivision, axis rules and speed law as for our own layers, for ways that come from
 //! elsewhere, such as another slicer's program. Between two calls the machine comes to rest.
 
+use machine::gcode::dialect::Space;
 use machine::kinematics::Unreachable;
 use machine::profile::Printer;
 use machine::program::Move;
@@ -16,6 +17,7 @@ use crate::time;
 #[derive(Debug, Clone)]
 pub struct Follower {
     printer: Printer,
+    space: Space,
     resampler: Resampler,
     limits: Limits,
     pace: Pace,
@@ -48,6 +50,7 @@ impl Follower {
     pub fn new(printer: &Printer, params: ResampleParams) -> Self {
         Self {
             printer: printer.clone(),
+            space: params.dialect.space,
             resampler: Resampler::new(printer, params),
             limits: Limits::of(printer, params.dialect.space),
             pace: Pace::REST,
@@ -75,7 +78,7 @@ impl Follower {
         let travels = travels(&legs, start);
         let (times, pace) = durations(&legs, &travels, self.pace, &self.limits);
         self.pace = pace;
-        self.time += time::estimate(&legs, &travels, &times, &self.printer);
+        self.time += time::estimate(&legs, &travels, &times, &self.printer, self.space);
         let moves = legs.iter().zip(times).map(|(leg, duration)| Move {
             to: leg.to,
             at: leg.at,

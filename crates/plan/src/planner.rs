@@ -248,7 +248,13 @@ impl<'a> Planner<'a> {
             (times, pace) = durations(&legs, &travels, self.pace, &self.limits);
         }
         self.pace = pace;
-        self.totals.time += time::estimate(&legs, &travels, &times, self.printer);
+        self.totals.time += time::estimate(
+            &legs,
+            &travels,
+            &times,
+            self.printer,
+            self.params.resample.dialect.space,
+        );
         for (leg, travel) in legs.iter().zip(&travels) {
             self.count(leg, travel.axes[1]);
         }

@@ -3,8 +3,10 @@
 //! Every move accelerates from the speed at which it is entered to the commanded one and brakes to
 //! the speed of the next, within what rail, bed and path allow; between two moves each axis may jump
 //! by its jerk. Speeds at the joints are found by one pass backwards and one forwards, as firmwares
-//! do.
+//! do. Where the words are part coordinates, the two straight axes of such a machine have the limits
+//! of the rail.
 
+use machine::gcode::dialect::Space;
 use machine::profile::Printer;
 
 use crate::resample::Leg;
@@ -17,23 +19,60 @@ pub(crate) fn estimate(
     travels: &[Travel],
     durations: &[f64],
     printer: &Printer,
+    space: Space,
 ) -> f64 {
+    let limits = Limits::of(printer, space);
+    let mut before: Option<&Leg> = None;
     let moves: Vec<Ramp> = legs
         .iter()
         .zip(travels)
         .zip(durations)
-        .map(|((leg, travel), &duration)| Ramp::new(leg, travel, duration, printer))
+        .map(|((leg, travel), &duration)| {
+            let from = before.replace(leg);
+            let axes = match (space, from) {
+                (Space::Part, Some(from)) => [leg.at.x - from.at.x, leg.at.y - from.at.y],
+                (Space::Part, None) => [0.0; 2],
+                (Space::Joints | Space::IdealPlane, _) => travel.axes,
+            };
+            Ramp::new(leg, axes, travel.lift, duration, &limits)
+        })
         .collect();
     // Square of the speed at which each move is entered; the last entry is the end.
     let mut entries = vec![0.0; moves.len() + 1];
     for i in (1..moves.len()).rev() {
-        let junction = moves[i - 1].junction(&moves[i], printer);
+        let junction = moves[i - 1].junction(&moves[i], &limits);
         entries[i] = (junction * junction).min(moves[i].reachable(entries[i + 1]));
     }
     for i in 0..moves.len() {
         entries[i + 1] = entries[i + 1].min(moves[i].reachable(entries[i]));
     }
     moves.iter().zip(entries.windows(2)).map(|(ramp, ends)| ramp.time(ends[0], ends[1])).sum()
+}
+
+/// What speeds may do.
+struct Limits {
+    path: f64,
+    lift: f64,
+    /// Accelerations of the two axes of the plane.
+    axes: [f64; 2],
+    /// How much their speeds may change at once.
+    jerks: [f64; 2],
+}
+
+impl Limits {
+    fn of(printer: &Printer, space: Space) -> Self {
+        let rail = (printer.rail.acceleration, printer.rail_jerk);
+        let other = match space {
+            Space::Part => rail,
+            Space::Joints | Space::IdealPlane => (printer.bed.acceleration, printer.bed_jerk),
+        };
+        Self {
+            path: printer.path_acceleration,
+            lift: printer.lift.acceleration,
+            axes: [rail.0, other.0],
+            jerks: [rail.1, other.1],
+        }
+    }
 }
 
 /// A move as one that can be sped up and braked.
@@ -50,24 +89,24 @@ struct Ramp {
 }
 
 impl Ramp {
-    fn new(leg: &Leg, travel: &Travel, duration: f64, printer: &Printer) -> Self {
-        let per_mm = travel.axes.map(|d| if leg.path > 0.0 { d / leg.path } else { 0.0 });
-        let lift = if leg.path > 0.0 { travel.lift / leg.path } else { 0.0 };
+    fn new(leg: &Leg, axes: [f64; 2], lift: f64, duration: f64, limits: &Limits) -> Self {
+        let per_mm = axes.map(|d| if leg.path > 0.0 { d / leg.path } else { 0.0 });
+        let lift = if leg.path > 0.0 { lift / leg.path } else { 0.0 };
         let limited = |limit: f64, share: f64| {
             if share == 0.0 { f64::INFINITY } else { limit / share.abs() }
         };
-        let acceleration = printer
-            .path_acceleration
-            .min(limited(printer.rail.acceleration, per_mm[0]))
-            .min(limited(printer.bed.acceleration, per_mm[1]))
-            .min(limited(printer.lift.acceleration, lift));
+        let acceleration = limits
+            .path
+            .min(limited(limits.axes[0], per_mm[0]))
+            .min(limited(limits.axes[1], per_mm[1]))
+            .min(limited(limits.lift, lift));
         Self { path: leg.path, cruise: leg.path / duration, acceleration, per_mm, duration }
     }
 
     /// The greatest speed at which the next move can be entered.
-    fn junction(&self, next: &Self, printer: &Printer) -> f64 {
+    fn junction(&self, next: &Self, limits: &Limits) -> f64 {
         let speed = self.cruise.min(next.cruise);
-        let jerks = [printer.rail_jerk, printer.bed_jerk];
+        let jerks = limits.jerks;
         (0..2).fold(speed, |speed, k| {
             let jump = (next.per_mm[k] - self.per_mm[k]).abs();
             if jump * speed > jerks[k] { jerks[k] / jump } else { speed }
@@ -111,7 +150,7 @@ mod tests {
             travels.push(Travel { axes: [length, 0.0], lift: 0.0 });
         }
         let durations: Vec<f64> = lengths.iter().map(|l| l.abs() / speed).collect();
-        estimate(&legs, &travels, &durations, &printer())
+        estimate(&legs, &travels, &durations, &printer(), Space::Joints)
     }
 
     #[test]

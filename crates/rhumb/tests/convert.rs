@@ -189,6 +189,19 @@ fn layers_that_are_only_numbered_get_their_heights_and_the_program_proves_sound(
 }
 
 #[test]
+fn the_time_told_is_that_of_the_twin() {
+    for printer in ["generic-polar", "klipper-polar", "marlin-polar", "core-r-theta"] {
+        let job = job(printer);
+        for source in [square(), as_cura_writes()] {
+            let (text, converted) = converted(&source, &job, [100.0, 100.0]).unwrap();
+            let verdict = check(text.as_bytes(), &job, None, false, |_| {}).unwrap();
+            let ratio = converted.time / verdict.totals.time;
+            assert!((ratio - 1.0).abs() < 0.05, "{printer}: {ratio}");
+        }
+    }
+}
+
+#[test]
 fn what_is_written_is_proved_on_its_way() {
     let job = job("klipper-polar");
     let request = Request {

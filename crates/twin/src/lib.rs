@@ -26,6 +26,7 @@ pub mod magnets;
 pub mod nearest;
 pub mod picture;
 mod pile;
+mod ramps;
 pub mod replay;
 pub mod rounding;
 #[cfg(test)]

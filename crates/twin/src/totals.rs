@@ -17,9 +17,11 @@ pub const BLOCK: usize = 32;
 pub struct Totals {
     /// Lines of text.
     pub lines: usize,
-    /// The durations of all motion at the commanded speeds, s. Waiting, and the firmware's own
-    /// ramps, come on top.
+    /// How long all motion takes, speeding up and braking as the profile allows, s. Waiting comes on
+    /// top.
     pub time: f64,
+    /// The durations of all motion at the commanded speeds, s: what a firmware without ramps takes.
+    pub commanded_time: f64,
     /// Filament fed, less what was drawn back, mm.
     pub filament: f64,
     /// The volume of that filament, mm³.

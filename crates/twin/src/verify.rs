@@ -39,6 +39,7 @@ use crate::check::text::Text;
 use crate::check::volume::{Enclosed, Volume};
 use crate::family::Family;
 use crate::finding::{Finding, Findings, Omitted, Place, Severity};
+use crate::ramps::Ramps;
 use crate::replay::{Event, Heating, LayerMark, Replay, read};
 use crate::rounding::Doubt;
 use crate::section::{Section, Sweep, surface, volume};
@@ -94,6 +95,7 @@ pub struct Verifier<'a> {
     replay: Replay,
     findings: Findings,
     tally: Tally,
+    ramps: Ramps,
     text: Text,
     modes: Modes,
     reach: Reach,
@@ -136,6 +138,7 @@ impl<'a> Verifier<'a> {
             replay: Replay::new(printer, dialect),
             findings: Findings::default(),
             tally: Tally::default(),
+            ramps: Ramps::new(printer),
             text: Text::new(dialect),
             modes: Modes::default(),
             reach: Reach::new(printer),
@@ -273,6 +276,7 @@ impl<'a> Verifier<'a> {
         let findings = &mut self.findings;
         let doubt = Doubt::of(segment);
         self.tally.segment(segment);
+        self.ramps.segment(segment);
         self.reach.segment(segment, findings);
         self.clearance.segment(segment, findings);
         self.speed.segment(segment, &doubt, findings);
@@ -297,6 +301,7 @@ impl<'a> Verifier<'a> {
     }
 
     fn rest(&mut self) {
+        self.ramps.rest();
         self.acceleration.rest(&mut self.findings);
     }
 
@@ -337,7 +342,8 @@ impl<'a> Verifier<'a> {
         let Tally { time, travel, moves, short_moves, bed_turn, nearest_to_axis, .. } = self.tally;
         Totals {
             lines: self.replay.lines(),
-            time,
+            time: self.ramps.time(),
+            commanded_time: time,
             filament: self.volume.filament(),
             volume: self.volume.filament() * self.setup.filament_area,
             by_role: self.volume.by_role(),
