@@ -81,6 +81,10 @@ pub enum Command {
     Preview(Preview),
     /// Send a program to a print server, Moonraker or OctoPrint
     Send(Send),
+    /// Turn a program into the pulses of the motors
+    Steps(Box<Steps>),
+    /// Turn a stepper on its driver: currents, speed, angle, final error
+    Motor(MotorTurn),
     /// List, show and check settings
     #[command(subcommand)]
     Profile(Profile),
@@ -442,6 +446,9 @@ pub struct Verify {
     /// How far to check: all that is quick, or support, overlap and clearance of every bead too
     #[arg(long, value_enum, default_value_t = Proof::Full)]
     pub proof: Proof,
+    /// Say how far the bed lags behind its motor where it changes its speed (see bed_inertia_kg_m2)
+    #[arg(long)]
+    pub load_angle: bool,
     /// Run the program on a machine that misses the ideal one like this, and say how far the part
     /// is off
     #[arg(long, value_name = "CAL.toml")]
@@ -560,6 +567,99 @@ pub enum Coloring {
     Height,
     /// What it is for.
     Role,
+}
+
+/// Arguments of `steps`.
+#[derive(Debug, Args)]
+#[command(after_long_help = STEPS_FORMATS)]
+pub struct Steps {
+    /// The program; or a table of prescribed points, a CSV file with t_s,x_mm,y_mm,z_mm
+    #[arg(required_unless_present = "example")]
+    pub program: Option<PathBuf>,
+    /// Where the pulses go, in the format that the end of the name says; `-` writes CSV to standard
+    /// output. Without it only their sums are told
+    #[arg(short, long, value_name = "FILE.(csv|bin|lpt)")]
+    pub output: Option<PathBuf>,
+    /// Draw how far whole steps put the nozzle off, over the bed
+    #[arg(long, value_name = "FILE.svg")]
+    pub picture: Option<PathBuf>,
+    /// How the phases of a motor follow each other in a file of port words
+    #[arg(long, value_enum, default_value_t = PhaseSequence::Half)]
+    pub sequence: PhaseSequence,
+    /// Run the built-in table of points on motors DSh-4-6B with 1.6 mm a pulse
+    #[arg(long, conflicts_with = "program")]
+    pub example: bool,
+    /// Which settings to use: motors, microsteps, gears, belts and screws belong to the printer; the
+    /// dialect is the one that the program names
+    #[command(flatten)]
+    pub settings: SettingsArguments,
+}
+
+/// Arguments of `motor`.
+#[derive(Debug, Args)]
+pub struct MotorTurn {
+    /// How far to turn, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 10.0, allow_hyphen_values = true)]
+    pub angle: f64,
+    /// Draw currents, speed and angle over time
+    #[arg(short, long, value_name = "FILE.svg")]
+    pub output: Option<PathBuf>,
+    /// Greatest speed, degrees a second
+    #[arg(long, value_name = "DEG", default_value_t = 180.0)]
+    pub speed: f64,
+    /// Acceleration, degrees per s²
+    #[arg(long, value_name = "DEG", default_value_t = 6000.0)]
+    pub acceleration: f64,
+    /// Torque against which it turns, N·m
+    #[arg(long, value_name = "NM", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub load: f64,
+    /// Inertia of what it turns, kg·m²
+    #[arg(long, value_name = "KGM2", default_value_t = 0.0)]
+    pub inertia: f64,
+    /// Dry friction, N·m
+    #[arg(long, value_name = "NM", default_value_t = 0.0)]
+    pub friction: f64,
+    /// Supply of the driver, V
+    #[arg(long, value_name = "V", default_value_t = 12.0)]
+    pub supply: f64,
+    /// Limit of the phase currents, A
+    #[arg(long, value_name = "A", default_value_t = 2.5)]
+    pub current: f64,
+    /// Frequency of the driver's sawtooth, Hz
+    #[arg(long, value_name = "HZ", default_value_t = 50_000.0)]
+    pub pwm: f64,
+    /// Microsteps in a full step
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub microsteps: u32,
+    /// How long to watch it after the turn, s
+    #[arg(long, value_name = "S", default_value_t = 0.15)]
+    pub settling: f64,
+    /// Do not feed the position back
+    #[arg(long)]
+    pub open_loop: bool,
+}
+
+/// The formats of `steps`, for its help.
+const STEPS_FORMATS: &str = "\
+Formats:
+  .csv  line,time_s,duration_s,R,theta,Z,E: the line of the program, when the interval begins and how
+        long it takes, and the pulses of each motor in it, negative backwards. Lines that begin with #
+        say what a pulse moves and where the motors stand at first, in pulses from zero.
+  .bin  little-endian: RHUMBSTP, version 1 and number of axes (1 byte each); for each axis its name
+        (8 bytes), what a pulse moves (f64, mm or degrees), its first count (i64); then for each interval
+        its duration in µs and the pulses of each axis, as LEB128, pulses folded (2n, or -2n - 1).
+  .lpt  time_us,word: a parallel port's words in the order in which they are put out. Bits 0-3 are the
+        phases A-D of a four-phase motor, bits 4-7 say whose: R, theta, Z, E. Full or half steps, whatever
+        the profile's microsteps.
+The place that pulses add up to is never more than half a step from where the program wants the axis.";
+
+/// Orders of the phases of a motor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PhaseSequence {
+    /// Two phases at a time; a word is a full step.
+    Full,
+    /// One and two phases by turns; a word is half a step.
+    Half,
 }
 
 /// What to do with settings.

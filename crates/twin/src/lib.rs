@@ -10,8 +10,9 @@
 //! tells its inside, [`nearest`] how far away its surface is. The checks, one concept each, are in [`check`],
 //! what they find in [`finding`], the sums of a program in [`totals`]; [`verify`] runs it all over
 //! a program. [`form`] compares the part with the one that a misaligned machine would make of the same
-//! program; [`picture`] draws what was replayed, so that a picture cannot lie. [`magnets`] is a machine
-//! with a sensor, for trying out a calibration.
+//! program; [`picture`] draws what was replayed, so that a picture cannot lie. [`steps`] counts the pulses of its
+//! motors, [`motor`] is a model of one. [`magnets`] is a machine with a sensor, for trying out a
+//! calibration.
 //!
 //! Lengths are mm, angles radians, times seconds, temperatures degrees Celsius. Frames: *Part*
 //! turns with the bed, *Machine* does not; both as in [`machine::kinematics`].
@@ -23,6 +24,7 @@ pub mod family;
 pub mod finding;
 pub mod form;
 pub mod magnets;
+pub mod motor;
 pub mod nearest;
 pub mod picture;
 mod pile;
@@ -33,6 +35,7 @@ pub mod rounding;
 mod sample;
 pub mod section;
 pub mod segment;
+pub mod steps;
 pub mod thorough;
 pub mod totals;
 pub mod verify;

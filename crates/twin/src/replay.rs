@@ -174,6 +174,14 @@ impl Replay {
         self.line
     }
 
+    /// Returns where the words bring the drives, the bed's before any play in it; `None` where words
+    /// are part coordinates.
+    #[must_use]
+    pub fn drives(&self) -> Option<Joints> {
+        let Stand { joints, drive, z, .. } = self.stand;
+        joints.map(|joints| Joints { s: joints.s, turn: drive, z })
+    }
+
     /// Returns the layer announced last.
     #[must_use]
     pub fn layer(&self) -> Option<usize> {

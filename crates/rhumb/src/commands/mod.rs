@@ -4,11 +4,13 @@ mod calibrate;
 mod convert;
 mod inspect;
 mod model;
+mod motor;
 mod orient;
 mod preview;
 mod profile;
 mod send;
 mod slice;
+mod steps;
 mod verify;
 
 use std::io::{self, Write};
@@ -44,6 +46,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         Command::Verify(arguments) => verify::run(arguments, manner),
         Command::Preview(arguments) => preview::run(arguments),
         Command::Send(arguments) => send::run(arguments, manner),
+        Command::Motor(arguments) => motor::run(arguments, manner),
+        Command::Steps(arguments) => steps::run(arguments, manner),
         Command::Profile(profile) => profile::run(profile, manner),
         Command::Model(arguments) => model::run(arguments),
     }

@@ -7,6 +7,7 @@ use machine::gcode::dialect::Space;
 use mesh::health::solid_from_soup;
 use mesh::stl;
 use twin::form::FormError;
+use twin::motor::lag::{Lag, Worst};
 use twin::thorough::Thorough;
 
 use super::{DONE, LOOK, display_name, say, say_json, settings};
@@ -22,8 +23,14 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
     let program = input::read(&arguments.program)?;
     let job = job_of(&program, &arguments.settings)?;
     let part = arguments.model.as_deref().map(part).transpose()?;
-    let verdict =
-        check(program.as_slice(), &job, part.as_ref(), arguments.proof == Proof::Full, |_| {})?;
+    let mut lag = arguments.load_angle.then(|| Lag::new(job.bed_drive));
+    let full = arguments.proof == Proof::Full;
+    let verdict = check(program.as_slice(), &job, part.as_ref(), full, |segment| {
+        if let Some(lag) = &mut lag {
+            lag.add(segment);
+        }
+    })?;
+    let lag = lag.map(|lag| lag.worst());
     let form = arguments.machine_error.as_deref();
     let form = form.map(|path| form_error(&program, &job, path)).transpose()?;
     if manner.json {
@@ -41,6 +48,7 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
                 "rms_fitted_mm": form.rms_fitted,
                 "places": form.places,
             })),
+            "load_angle": lag.as_ref().map(load_angle),
             "support": verdict.totals.thorough.as_ref().map(support),
         }))?;
     } else {
@@ -69,6 +77,9 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
         );
         if let Some(thorough) = &totals.thorough {
             let _ = writeln!(out, "{}", laid(thorough));
+        }
+        if let Some(lag) = lag {
+            let _ = writeln!(out, "{}", lagging(&lag));
         }
         if let Some(form) = form {
             let _ = writeln!(
@@ -100,6 +111,28 @@ fn form_error(program: &[u8], job: &Job, path: &Path) -> Result<FormError, Failu
     let text = String::from_utf8_lossy(program);
     twin::form::compare(text.lines(), &job.printer, &off, job.dialect)
         .ok_or_else(|| Failure::new("NothingToPrint", "the program lays nothing"))
+}
+
+/// How far the bed lags behind its motor, as data.
+fn load_angle(lag: &Worst) -> serde_json::Value {
+    serde_json::json!({
+        "worst_mm": lag.distance,
+        "bed_deg": lag.angle.to_degrees(),
+        "line": lag.line,
+        "too_weak": lag.too_weak,
+    })
+}
+
+/// The same in a line.
+fn lagging(lag: &Worst) -> String {
+    format!(
+        "the bed lags by {:.4}° at most, which is {:.1} µm of a bead (line {}); its motor is too weak \
+         on {} lines",
+        lag.angle.to_degrees(),
+        lag.distance * 1e3,
+        lag.line,
+        lag.too_weak
+    )
 }
 
 /// What lies below and around the beads, as data.

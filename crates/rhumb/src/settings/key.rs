@@ -228,6 +228,21 @@ const fn text(
     Key { name, section, kind: Kind::Text, default, program_name, meaning }
 }
 
+/// Counts of a motor, which no program needs to say.
+const fn motor(
+    name: &'static str,
+    (default, least, greatest): (i64, i64, i64),
+    meaning: &'static str,
+) -> Key {
+    let default = Default::Count(default);
+    let kind = Kind::Count(least, greatest);
+    Key { name, section: Printer, kind, default, program_name: "", meaning }
+}
+
+const fn drive(name: &'static str, default: &'static str, meaning: &'static str) -> Key {
+    text(Printer, name, "", default, meaning)
+}
+
 use Section::{Material, Print, Printer};
 
 const DIALECTS: &[&str] = &[
@@ -372,6 +387,79 @@ pub const KEYS: &[Key] = &[
         "axis_clearance",
         (0.02, 0.001, 10.0),
         "nothing runs nearer past the rotation axis, unless straight through it",
+    ),
+    drive(
+        "rail_transmission",
+        "belt 20x2",
+        "how its motor moves the carriage: belt TEETHxPITCH, screw LEAD, pinion RADIUS or step TRAVEL, mm",
+    ),
+    motor(
+        "rail_motor_steps",
+        (200, 4, 10_000),
+        "full steps in a turn of the motor of the carriage",
+    ),
+    motor("rail_microsteps", (16, 1, 1024), "pulses in a full step of that motor"),
+    number(
+        Printer,
+        "rail_gear_ratio",
+        "",
+        (1.0, 0.01, 1000.0),
+        "turns of that motor for one behind its gear",
+    ),
+    motor("bed_motor_steps", (200, 4, 10_000), "full steps in a turn of the motor of the bed"),
+    motor("bed_microsteps", (16, 1, 1024), "pulses in a full step of that motor"),
+    number(
+        Printer,
+        "bed_gear_ratio",
+        "",
+        (5.0, 0.01, 1000.0),
+        "turns of that motor for one behind its gear",
+    ),
+    number(
+        Printer,
+        "bed_inertia_kg_m2",
+        "",
+        (0.004, 0.0, 100.0),
+        "moment of inertia of bed and part, for the lag of the bed's motor",
+    ),
+    number(
+        Printer,
+        "bed_motor_current_a",
+        "",
+        (2.5, 0.01, 100.0),
+        "amplitude of the currents of the bed's motor, likewise",
+    ),
+    drive(
+        "z_transmission",
+        "screw 8",
+        "how its motor moves the lift: belt TEETHxPITCH, screw LEAD, pinion RADIUS or step TRAVEL, mm",
+    ),
+    motor("z_motor_steps", (200, 4, 10_000), "full steps in a turn of the motor of the lift"),
+    motor("z_microsteps", (16, 1, 1024), "pulses in a full step of that motor"),
+    number(
+        Printer,
+        "z_gear_ratio",
+        "",
+        (1.0, 0.01, 1000.0),
+        "turns of that motor for one behind its gear",
+    ),
+    drive(
+        "extruder_transmission",
+        "pinion 3.68",
+        "how its motor moves the filament: belt TEETHxPITCH, screw LEAD, pinion RADIUS or step TRAVEL, mm",
+    ),
+    motor(
+        "extruder_motor_steps",
+        (200, 4, 10_000),
+        "full steps in a turn of the motor of the filament",
+    ),
+    motor("extruder_microsteps", (16, 1, 1024), "pulses in a full step of that motor"),
+    number(
+        Printer,
+        "extruder_gear_ratio",
+        "",
+        (3.0, 0.01, 1000.0),
+        "turns of that motor for one behind its gear",
     ),
     number(
         Printer,

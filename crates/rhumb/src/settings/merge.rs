@@ -80,6 +80,11 @@ pub const BUILT_IN: &[BuiltIn] = &[
         text: include_str!("../../profiles/linuxcnc-rotary.toml"),
     },
     BuiltIn {
+        name: "dsh-4-6b",
+        section: Section::Printer,
+        text: include_str!("../../profiles/dsh-4-6b.toml"),
+    },
+    BuiltIn {
         name: "pla",
         section: Section::Material,
         text: include_str!("../../profiles/pla.toml"),

@@ -1,6 +1,7 @@
 //! From settings to the parameters of each stage: the only place that looks values up by name.
 
 use geom::tolerance::Tolerances;
+use machine::drive::{Drive, Drives, Transmission};
 use machine::gcode::Dialect;
 use machine::gcode::dialect::Space;
 use machine::height_map::HeightMap;
@@ -24,6 +25,8 @@ use slicer::level::{ScheduleParams, Snap};
 use slicer::skins::SkinParams;
 use slicer::thin::ThinParams;
 use slicer::walls::WallParams;
+use twin::motor::Motor;
+use twin::motor::lag::BedDrive;
 
 use super::key::{Key, Value};
 use super::merge::Settings;
@@ -62,6 +65,10 @@ pub struct Job {
     pub density_g_per_mm3: f64,
     /// Height at which a probed bed is no longer corrected for, mm.
     pub bed_map_fade: f64,
+    /// What turns pulses into motion.
+    pub drives: Drives,
+    /// What turns the bed, for its lag.
+    pub bed_drive: BedDrive,
     /// Program before the print.
     pub start: Vec<String>,
     /// Program after the print.
@@ -109,6 +116,13 @@ impl Job {
             plan: plan(&get, dialect, &tolerances),
             density_g_per_mm3: get.number("filament_density_g_per_cm3") / 1000.0,
             bed_map_fade: get.number("bed_map_fade_mm"),
+            drives: drives(&get)?,
+            bed_drive: BedDrive {
+                motor: Motor::NEMA_17,
+                current: get.number("bed_motor_current_a"),
+                gear_ratio: get.number("bed_gear_ratio"),
+                inertia: get.number("bed_inertia_kg_m2"),
+            },
             start: template::fill(get.text("start_gcode"), "start_gcode", settings)?,
             end: template::fill(get.text("end_gcode"), "end_gcode", settings)?,
             printer,
@@ -177,6 +191,33 @@ fn printer(get: &Lookup<'_>) -> Printer {
         bed_map: HeightMap::default(),
         most_turn: most_turn(get.number("turns_max")),
     }
+}
+
+fn drives(get: &Lookup<'_>) -> Result<Drives, Failure> {
+    let drive = |axis: &str| -> Result<Drive, Failure> {
+        let transmission = if axis == "bed" {
+            Transmission::Shaft
+        } else {
+            let name = format!("{axis}_transmission");
+            let text = get.text(&name);
+            Transmission::parse(text).ok_or_else(|| {
+                let wanted = Transmission::WANTED;
+                Failure::new("ConfigRange", format!("{name} = {text:?} is not {wanted}"))
+            })?
+        };
+        Ok(Drive {
+            motor_steps: get.count(&format!("{axis}_motor_steps")) as u32,
+            microsteps: get.count(&format!("{axis}_microsteps")) as u32,
+            gear_ratio: get.number(&format!("{axis}_gear_ratio")),
+            transmission,
+        })
+    };
+    Ok(Drives {
+        rail: drive("rail")?,
+        bed: drive("bed")?,
+        lift: drive("z")?,
+        filament: drive("extruder")?,
+    })
 }
 
 /// Takes from a printer what its firmware cannot use.

@@ -5,17 +5,21 @@
 //! but replayed segments is drawn, so a picture cannot show what the machine would not do; only
 //! [`thumbnail`]s, which stand at the head of a program, are drawn from the mesh. Colours of lines and
 //! text are of middle lightness: pictures have no background of their own and are legible on
-//! white and on black. [`fit`] and [`error_map`] draw a calibration instead of a program.
+//! white and on black. [`fit`] and [`error_map`] draw a calibration instead of a
+//! program, [`step_map`] what whole steps of its motors make of one,
+//! [`motor`] what a motor does during a turn.
 
 pub mod camera;
 pub mod deposit;
 pub mod error_map;
 pub mod fit;
 pub mod layer;
+pub mod motor;
 mod palette;
 pub mod plot;
 pub mod print;
 mod raster;
+pub mod step_map;
 mod svg;
 pub mod thumbnail;
 mod trace;

@@ -149,6 +149,19 @@ impl Canvas {
         );
     }
 
+    /// A filled rectangle.
+    pub(super) fn cell(&mut self, at: [f64; 2], size: [f64; 2], colour: Colour) {
+        let _ = writeln!(
+            self.text,
+            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\"/>",
+            number(at[0]),
+            number(at[1]),
+            number(size[0]),
+            number(size[1]),
+            colour.hex()
+        );
+    }
+
     /// Text whose baseline starts at this place.
     pub(super) fn label(&mut self, x: f64, y: f64, size: f64, text: &str) {
         let (x, y, size) = (number(x), number(y), number(size));
