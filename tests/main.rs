@@ -15,6 +15,7 @@ mod house;
 mod interrupt;
 mod limits;
 mod motor;
+mod mutants;
 mod names;
 mod preview;
 mod program;

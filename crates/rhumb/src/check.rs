@@ -28,6 +28,7 @@ pub fn check(
         printer: &job.printer,
         dialect: job.dialect,
         filament_area: job.plan.filament.area,
+        volume_per_second: job.plan.filament.volume_per_second,
         mesh: part,
         solid: job.paths.skins.all_solid,
         thorough,

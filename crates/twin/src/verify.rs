@@ -5,8 +5,8 @@
 //! use twin::verify::{Setup, Verifier};
 //! # fn example(printer: &machine::profile::Printer, mesh: &mesh::mesh::Mesh, text: &str) {
 //! let filament_area = 2.405;
-//! let setup = Setup { printer, dialect: POLAR, filament_area, mesh: Some(mesh), solid: false,
-//!                     thorough: false };
+//! let setup = Setup { printer, dialect: POLAR, filament_area, volume_per_second: 11.0,
+//!                     mesh: Some(mesh), solid: false, thorough: false };
 //! let mut verifier = Verifier::new(setup);
 //! for line in text.lines() {
 //!     verifier.line(line);
@@ -28,6 +28,7 @@ use mesh::mesh::Mesh;
 use crate::check::acceleration::Acceleration;
 use crate::check::axis::Clearance;
 use crate::check::continuity::Continuity;
+use crate::check::declared::Declared;
 use crate::check::deposit::{Deposit, Solid};
 use crate::check::flow::Flow;
 use crate::check::heat::Heat;
@@ -56,6 +57,8 @@ pub struct Setup<'a> {
     pub dialect: Dialect,
     /// The cross-section of the filament, mm².
     pub filament_area: f64,
+    /// The most filament that melts, mm³/s; infinite when that is not known.
+    pub volume_per_second: f64,
     /// The part as it was placed, in the frame of the part.
     pub mesh: Option<&'a Mesh>,
     /// Whether the print is meant to be solid.
@@ -97,6 +100,7 @@ pub struct Verifier<'a> {
     tally: Tally,
     ramps: Ramps,
     text: Text,
+    declared: Declared,
     modes: Modes,
     reach: Reach,
     clearance: Clearance,
@@ -140,6 +144,7 @@ impl<'a> Verifier<'a> {
             tally: Tally::default(),
             ramps: Ramps::new(printer),
             text: Text::new(dialect),
+            declared: Declared::default(),
             modes: Modes::default(),
             reach: Reach::new(printer),
             clearance: Clearance::new(printer),
@@ -148,7 +153,7 @@ impl<'a> Verifier<'a> {
             continuity: Continuity::default(),
             heat: Heat::new(printer),
             surface: Surface::new(printer),
-            flow: Flow::new(printer, filament_area),
+            flow: Flow::new(printer, filament_area, setup.volume_per_second),
             volume: Volume::new(filament_area, printer.nozzle_diameter),
             deposit: Deposit::new(printer),
             watch: setup.thorough.then(|| Watch::new(&setup)),
@@ -189,6 +194,7 @@ impl<'a> Verifier<'a> {
         self.rest();
         self.continuity.end(place, &mut self.findings);
         self.heat.end(place, &mut self.findings);
+        self.declared.end(&mut self.findings);
         self.flow.end(place, &mut self.findings);
         let enclosed = self
             .setup
@@ -234,6 +240,9 @@ impl<'a> Verifier<'a> {
         match &line.command {
             Some(command) => self.command(command, place),
             None => {
+                if let Some(comment) = line.comment {
+                    self.declared.comment(comment, place);
+                }
                 let event = self.replay.follow(&line);
                 self.event(event, place)
             }
@@ -277,6 +286,7 @@ impl<'a> Verifier<'a> {
         let doubt = Doubt::of(segment);
         self.tally.segment(segment);
         self.ramps.segment(segment);
+        self.declared.segment(segment);
         self.reach.segment(segment, findings);
         self.clearance.segment(segment, findings);
         self.speed.segment(segment, &doubt, findings);
@@ -309,6 +319,7 @@ impl<'a> Verifier<'a> {
         self.end_layer();
         self.continuity.layer(mark, &mut self.findings);
         self.surface.layer(mark);
+        self.declared.layer();
         self.flow.layer(mark);
         if let Some(watch) = &mut self.watch {
             watch.layer(mark, &mut self.findings);

@@ -176,7 +176,11 @@ fn laid(thorough: &Thorough) -> String {
 pub(super) fn job_of(program: &[u8], arguments: &SettingsArguments) -> Result<Job, Failure> {
     let mut arguments = arguments.clone();
     let mut named = Vec::new();
-    for (name, key) in [("dialect", "dialect"), ("filament_diameter", "filament_diameter_mm")] {
+    for (name, key) in [
+        ("dialect", "dialect"),
+        ("filament_diameter", "filament_diameter_mm"),
+        ("filament_max_volumetric_speed", "max_volumetric_speed_mm3_per_s"),
+    ] {
         if let Some(value) = setting_at_end(program, name) {
             named.push(format!("{key}={value}"));
         }

@@ -5,6 +5,8 @@
 //! * No extruding segment leaves its chord by more than [`JUMP`] farther than [`NEAR_AXIS`] from
 //!   the axis, unless it turns the bed by no more than [`ARC`]: joint-linear moves follow straight
 //!   lines only in pieces, and arcs about the axis in pieces of any length. `Custom` lines are free: priming along an arc about the axis is natural.
+//! * No wall runs back over the line before: two lines that follow each other and turn by more than
+//!   [`BACK`] are in the wrong order.
 //! * Material is laid only with the filament at the nozzle's tip: what was drawn back must have
 //!   been pushed forward again, and no more than that. How the print before left the filament is
 //!   not known, so before the first time that it is drawn back anything may be pushed, and for
@@ -12,11 +14,13 @@
 //! * Layers are numbered from 0 without a gap, and none lies lower than the one before.
 
 use machine::program::Role;
+use nalgebra::Vector3;
 
 use crate::finding::{Findings, Place, exceeds};
 use crate::replay::LayerMark;
 use crate::rounding;
 use crate::segment::{Kind, Segment};
+use crate::totals::SHORT;
 
 /// The name of this check.
 pub const NAME: &str = "continuity";
@@ -33,6 +37,10 @@ pub const ARC: f64 = 16.0 * std::f64::consts::PI / 180.0;
 /// chord for the bed's sake, and `axis` and `speed` watch it.
 pub const NEAR_AXIS: f64 = 1.0;
 
+/// Turn from one line of a wall to the next that is no corner of a part, radians: 178.9°, a tip of
+/// 1.1°.
+pub const BACK: f64 = std::f64::consts::PI - 0.02;
+
 /// Filament that may be missing at the tip, or pushed too far, before it counts, mm. Words have 5
 /// decimals; 0.001 mm is a hundredth of a visible drop.
 pub const PRIMED: f64 = 1e-3;
@@ -48,6 +56,8 @@ pub(crate) struct Continuity {
     drawn: f64,
     layer: Option<LayerMark>,
     retractions: usize,
+    /// The way of the line before, when it was of a wall.
+    last_wall: Option<Vector3<f64>>,
     worst_deviation: f64,
 }
 
@@ -57,7 +67,26 @@ impl Continuity {
         if segment.extrudes() && segment.role != Role::Custom {
             self.jump(segment, findings);
         }
+        self.back(segment, findings);
         self.filament(segment, findings);
+    }
+
+    /// Judges whether a wall runs back over itself. Where the bed turns by much, the chord says little
+    /// of a line's direction at its ends.
+    fn back(&mut self, segment: &Segment, findings: &mut Findings) {
+        let is_wall = matches!(segment.role, Role::ExternalPerimeter | Role::Perimeter);
+        let is_straight = segment.bed_change().abs() < 0.1 && segment.nearest > NEAR_AXIS;
+        let way = segment.part[1] - segment.part[0];
+        let is_judged = is_wall && is_straight && segment.extrudes() && segment.path > SHORT;
+        let last = std::mem::replace(&mut self.last_wall, is_judged.then_some(way));
+        let (Some(last), true) = (last, is_judged) else { return };
+        // For nearly every pair the sign of the product says that they go on.
+        if last.dot(&way) < 0.0 && last.angle(&way) > BACK {
+            let angle = last.angle(&way);
+            findings.warning(NAME, Place::end_of(segment), (angle, BACK), || {
+                format!("a wall turns by {:.2}° and runs back over itself", angle.to_degrees())
+            });
+        }
     }
 
     pub(crate) fn layer(&mut self, layer: LayerMark, findings: &mut Findings) {
@@ -189,6 +218,20 @@ mod tests {
         }
         check.end(Place::line(9, None), &mut findings);
         findings.kept().iter().map(|finding| finding.limit).collect()
+    }
+
+    #[test]
+    fn a_wall_that_runs_back_over_itself_is_found() {
+        // Radial lines, on whose way back the bed stands.
+        let out = laid(polar_segment([20.0, 0.0], [20.5, 0.0], 20.0));
+        let back = laid(polar_segment([20.5, 0.0], [20.2, 0.0], 20.0));
+        let aside = laid(polar_segment([20.5, 0.0], [20.2, 0.01], 20.0));
+        assert_eq!(found(&[out, back]), [BACK]);
+        assert_eq!(found(&[out, aside]), []);
+        let fill = |segment| Segment { role: Role::SolidInfill, ..segment };
+        assert_eq!(found(&[fill(out), fill(back)]), []);
+        let travel = polar_segment([20.5, 0.0], [20.2, 0.0], 20.0);
+        assert_eq!(found(&[out, travel]), []);
     }
 
     #[test]

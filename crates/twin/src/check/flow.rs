@@ -9,6 +9,8 @@
 //! * Beads of curved layers may be from [`THINNEST`] to [`THICKEST`] of their layer, as wedges on a
 //!   flat floor are.
 //!
+//! No line asks for more volume in a second than melts.
+//!
 //! Lines that go round the axis are shorter or longer than what they stand for, and are not judged.
 //! mm.
 
@@ -29,12 +31,11 @@ pub const NAME: &str = "flow";
 /// shows on a wall.
 pub const OFF: f64 = 0.03;
 
-/// The most that a bead may hold beyond that, mm³: a ball of 0.8 mm. Less is found
-/// where a line turns back on itself and is cut short.
-pub const BLOB: f64 = 0.30;
+/// The most that a bead may hold beyond that, mm³: a ball of 0.34 mm, less than a bead's width.
+pub const BLOB: f64 = 0.02;
 
-/// The most that it may lack, mm³: 0.2 mm of a wall.
-pub const LACK: f64 = 0.02;
+/// The most that it may lack, mm³: 0.06 mm of a wall.
+pub const LACK: f64 = 0.005;
 
 /// How much any bead of a planar layer may be, besides the rounding of `;WIDTH:` to 0.01 mm.
 pub const DRIFT: f64 = 0.15;
@@ -62,6 +63,8 @@ const CLASS: f64 = 0.005;
 #[derive(Debug)]
 pub(crate) struct Flow {
     filament_area: f64,
+    /// mm³/s.
+    volume_per_second: f64,
     /// Nearer to the axis nothing is judged, mm.
     round_axis: f64,
     mark: Option<LayerMark>,
@@ -70,10 +73,17 @@ pub(crate) struct Flow {
 }
 
 impl Flow {
-    /// Returns the check for this printer and filament of this cross-section, mm².
-    pub(crate) fn new(printer: &Printer, filament_area: f64) -> Self {
+    /// Returns the check for this printer and filament of this cross-section, mm², of which so much
+    /// melts, mm³/s.
+    pub(crate) fn new(printer: &Printer, filament_area: f64, volume_per_second: f64) -> Self {
         let round_axis = ROUND_AXIS * printer.axis_clearance;
-        Self { filament_area, round_axis, mark: None, classes: Default::default() }
+        Self {
+            filament_area,
+            volume_per_second,
+            round_axis,
+            mark: None,
+            classes: Default::default(),
+        }
     }
 
     pub(crate) fn layer(&mut self, mark: LayerMark) {
@@ -81,6 +91,7 @@ impl Flow {
     }
 
     pub(crate) fn segment(&mut self, segment: &Segment, doubt: &Doubt, findings: &mut Findings) {
+        self.melts(segment, doubt, findings);
         let Some(mark) = self.mark else { return };
         let Some(height) = mark.height.filter(|height| *height > 0.0) else { return };
         if !segment.extrudes() || segment.role == Role::Custom || segment.width <= 0.0 {
@@ -120,6 +131,21 @@ impl Flow {
         }
     }
 
+    /// Judges the volume in a second.
+    fn melts(&self, segment: &Segment, doubt: &Doubt, findings: &mut Findings) {
+        if !segment.extrudes() || segment.duration <= 0.0 {
+            return;
+        }
+        let rate = segment.filament * self.filament_area / segment.duration;
+        let limit = self.volume_per_second;
+        let rounded = doubt.duration + FILAMENT / segment.filament;
+        if exceeds(rate, limit * (1.0 + rounded)) {
+            findings.warning(NAME, Place::end_of(segment), (rate, limit), || {
+                format!("a line asks for {rate:.2} mm³/s of filament, {limit} mm³/s melt")
+            });
+        }
+    }
+
     /// Ends the program.
     pub(crate) fn end(&self, place: Place, findings: &mut Findings) {
         for (role, classes) in Role::ALL.iter().zip(&self.classes) {
@@ -154,7 +180,8 @@ mod tests {
     /// What is found of a hundred beads with this share of the announced cross-section.
     fn found(share: f64, family: Option<Family>) -> Vec<f64> {
         let printer = Printer { axis_clearance: 0.02, ..printer() };
-        let (mut check, mut findings) = (Flow::new(&printer, 2.0), Findings::default());
+        let (mut check, mut findings) =
+            (Flow::new(&printer, 2.0, f64::INFINITY), Findings::default());
         check.layer(LayerMark { line: 1, index: 0, top: None, height: Some(0.2), family });
         for k in 0..110 {
             let at = |x: f64| Point3::new(x, 5.0 + f64::from(k), 0.2);
@@ -176,6 +203,19 @@ mod tests {
         assert_eq!(found(0.95, None), [1.0]);
         assert_eq!(found(1.5, None)[0], 1.0 + DRIFT);
         assert_eq!(found(0.6, None)[0], 1.0 - DRIFT);
+    }
+
+    #[test]
+    fn no_more_volume_is_asked_for_than_melts() {
+        let count = |filament: f64| {
+            let (check, mut findings) = (Flow::new(&printer(), 2.0, 10.0), Findings::default());
+            // 20 mm at 20 mm/s: a second.
+            let mut segment = part_segment(Point3::new(0.0, 5.0, 0.2), Point3::new(20.0, 5.0, 0.2));
+            segment.filament = filament;
+            check.melts(&segment, &Doubt::of(&segment), &mut findings);
+            findings.kept().len()
+        };
+        assert_eq!([4.99, 5.0, 5.01].map(count), [0, 0, 1]);
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! is compared with the printer's profile after allowing for [rounding](crate::rounding); a value
 //! that is not a number is always a finding.
 //!
-//! On the text: [`text`], [`modes`]. On the machine: [`reach`], [`axis`], [`speed`],
+//! On the text: [`text`], [`modes`], [`declared`]. On the machine: [`reach`], [`axis`], [`speed`],
 //! [`acceleration`], [`heat`]. On the part: [`continuity`], [`surface`],
 //! [`flow`], [`volume`], [`deposit`]. On what lies below and around, where a full proof is asked for:
 //! [`support`], [`overlap`], [`coverage`], [`clearance`].
@@ -15,6 +15,7 @@ pub mod axis;
 pub mod clearance;
 pub mod continuity;
 pub mod coverage;
+pub mod declared;
 pub mod deposit;
 pub mod flow;
 pub mod heat;

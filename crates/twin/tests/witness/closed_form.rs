@@ -32,6 +32,7 @@ fn judged(printer: &Printer) -> Verdict {
         printer,
         dialect: machine::gcode::dialect::POLAR,
         filament_area: FILAMENT_AREA,
+        volume_per_second: f64::INFINITY,
         mesh: None,
         solid: false,
         thorough: false,

@@ -78,6 +78,7 @@ fn findings(run: &Run, printer: &Printer) -> Vec<String> {
         printer,
         dialect,
         filament_area: FILAMENT_AREA,
+        volume_per_second: f64::INFINITY,
         mesh: None,
         solid: false,
         thorough: false,

@@ -14,6 +14,7 @@ fn judge(lines: &[Vec<u8>]) -> usize {
             printer: &printer,
             dialect,
             filament_area: FILAMENT_AREA,
+            volume_per_second: f64::INFINITY,
             mesh: Some(&mesh),
             solid: true,
             thorough: false,
