@@ -186,11 +186,7 @@ impl AxisGraph {
         rim: &Rim,
         chart: &Chart,
     ) -> usize {
-        let [a, b] = across;
-        let in_chart = 2.0 * rim.distance(&at, distance(&at, a));
-        // Widths are measured across the place, where the chart may not be true.
-        let width =
-            if chart.is_flat() { in_chart } else { in_chart * chart.length(a, b) / distance(a, b) };
+        let width = 2.0 * rim.distance(&at, distance(&at, &across[0]), chart);
         self.nodes.push(AxisPoint { at, width });
         self.links.push(Vec::new());
         self.nodes.len() - 1

@@ -31,7 +31,12 @@ pub fn carried(surface: &dyn LayerSurface, region: &Region, from: f64, to: f64) 
     if from == to || surface.chart(from).is_flat() {
         return region.clone();
     }
-    let image = |p: &Point2<f64>| carried_point(surface, p, from, to);
+    image_of(region, |p| carried_point(surface, p, from, to))
+}
+
+/// Returns the image of a region under a map that keeps the order of places and bends sides gently;
+/// sides get points until they are followed to within a few µm.
+pub(super) fn image_of(region: &Region, image: impl Fn(&Point2<f64>) -> Point2<f64>) -> Region {
     let rings: Vec<Ring> = region
         .rings()
         .map(|ring| {

@@ -57,6 +57,39 @@ impl Chart {
         }
     }
 
+    /// Returns the radius at which the chart shows what is `r` mm from the axis: the inverse of
+    /// [`radius`](Self::radius).
+    #[must_use]
+    pub fn meridian(&self, r: f64) -> f64 {
+        match *self {
+            Self::Plane => r,
+            Self::Cone { cos } => r / cos,
+            Self::Sphere { radius } => radius * (r / radius).clamp(-1.0, 1.0).asin(),
+        }
+    }
+
+    /// Returns a place of the chart as it is seen along the axis.
+    #[must_use]
+    pub fn seen_from_above(&self, p: &Point2<f64>) -> Point2<f64> {
+        p * self.stretch(p.coords.norm())
+    }
+
+    /// Returns the place of the chart that is seen along the axis at `p`.
+    #[must_use]
+    pub fn under(&self, p: &Point2<f64>) -> Point2<f64> {
+        let r = p.coords.norm();
+        if r == 0.0 { *p } else { p * (self.meridian(r) / r) }
+    }
+
+    /// Returns a region of the chart as it is seen along the axis.
+    #[must_use]
+    pub fn region_from_above(&self, region: &Region) -> Region {
+        if self.is_flat() {
+            return region.clone();
+        }
+        carry::image_of(region, |p| self.seen_from_above(p))
+    }
+
     /// Returns the true length by chart length across the meridian at radius `s`; also true area
     /// by chart area.
     #[must_use]

@@ -13,6 +13,7 @@ mod link;
 mod rectilinear;
 mod spiral;
 
+use geom::polyline::distance_to_segment;
 use geom::region::{Island, Region};
 use geom::simplify::simplify_line;
 use geom::spiral::Turning;
@@ -231,9 +232,16 @@ fn sparse(area: &Region, layer: &FillLayer, params: &InfillParams) -> Vec<FillLi
     let bead = Bead { width: params.width, thickness: layer.thickness };
     let spacing = bead.spacing() / params.density;
     let core = layer.chart.inset(area, bead.spacing() / 2.0);
+    // Parallel lines are so as seen along the axis, where those of all layers lie over each other.
+    let from_above = layer.chart.region_from_above(&core);
     let parallel = |spacing: f64, angle: f64| {
-        let chords = rectilinear::about_axis(&core, spacing, angle);
-        open_lines(&core, &chords, &SPARSE_JOINS, role, bead, layer)
+        let spacing = spacing * sparseness(&layer.chart);
+        let chords = rectilinear::about_axis(&from_above, spacing, angle);
+        let mut lines = open_lines(&from_above, &chords, &SPARSE_JOINS, role, bead, layer);
+        for line in &mut lines {
+            line.points = under(&line.points, layer);
+        }
+        lines
     };
     match params.pattern {
         Pattern::Rectilinear => parallel(spacing, angle_in(layer, params)),
@@ -253,6 +261,47 @@ fn sparse(area: &Region, layer: &FillLayer, params: &InfillParams) -> Vec<FillLi
             open_lines(&core, &chords, &SPARSE_JOINS, role, bead, layer)
         }
     }
+}
+
+/// How much closer lines lie as seen along the axis than on the layer, on the average over their
+/// directions: a layer that slopes by `a` is `1/cos a` larger than it looks; lines along the slope
+/// are longer by as much, lines across it as long as they look. On spheres as at the axis, since
+/// lines of steeper and flatter layers are to lie over each other.
+fn sparseness(chart: &Chart) -> f64 {
+    match chart {
+        Chart::Cone { cos } => f64::midpoint(*cos, 1.0),
+        Chart::Plane | Chart::Sphere { .. } => 1.0,
+    }
+}
+
+/// A line seen along the axis, in the chart, with points until it is followed to within the
+/// tolerance.
+fn under(line: &[Point2<f64>], layer: &FillLayer) -> Vec<Point2<f64>> {
+    let chart = &layer.chart;
+    let mut points: Vec<Point2<f64>> = line.iter().take(1).map(|p| chart.under(p)).collect();
+    for pair in line.windows(2) {
+        let ends = [chart.under(&pair[0]), chart.under(&pair[1])];
+        under_side([pair[0], pair[1]], ends, layer, &mut points);
+        points.push(ends[1]);
+    }
+    points
+}
+
+fn under_side(
+    [a, b]: [Point2<f64>; 2],
+    ends: [Point2<f64>; 2],
+    layer: &FillLayer,
+    points: &mut Vec<Point2<f64>>,
+) {
+    let middle = nalgebra::center(&a, &b);
+    let at = layer.chart.under(&middle);
+    let is_short = (b - a).norm_squared() <= layer.tolerance * layer.tolerance;
+    if is_short || distance_to_segment(&ends[0], &ends[1], &at) <= layer.tolerance {
+        return;
+    }
+    under_side([a, middle], [ends[0], at], layer, points);
+    points.push(at);
+    under_side([middle, b], [at, ends[1]], layer, points);
 }
 
 fn open_lines(
@@ -407,6 +456,42 @@ mod tests {
                 }
                 let limit = if pattern == Pattern::Concentric { 40 } else { 12 };
                 assert!(lines.len() <= limit, "{pattern:?}: {} lines", lines.len());
+            }
+        }
+    }
+
+    #[test]
+    fn sparse_lines_of_curved_layers_lie_over_each_other() {
+        // On spheres of different radii and on a cone: every point of a line that is not a join
+        // along the rim lies in one of the planes of the pattern.
+        let charts =
+            [Chart::Sphere { radius: 20.0 }, Chart::Sphere { radius: 31.0 }, Chart::cone(0.6)];
+        for pattern in [Pattern::Rectilinear, Pattern::Grid] {
+            let params = InfillParams { pattern, ..PARAMS };
+            for chart in charts {
+                let layer = FillLayer { chart, ..LAYER };
+                let area = disc(9.0);
+                let core = chart.inset(&area, 0.25);
+                let bead = Bead { width: 0.45, thickness: 0.2 };
+                let share = if pattern == Pattern::Grid { 2.0 } else { 1.0 };
+                let pitch = share * bead.spacing() / params.density * sparseness(&chart);
+                let lines = sparse(&area, &layer, &params);
+                let mut judged = 0;
+                let places = lines
+                    .iter()
+                    .flat_map(|line| line.points.windows(2))
+                    .flat_map(|w| [0.0, 0.25, 0.5].map(|share| w[0] + (w[1] - w[0]) * share))
+                    .filter(|p| core.contains(p));
+                for p in places {
+                    let seen = chart.seen_from_above(&p);
+                    let off = [FRAC_PI_4, FRAC_PI_4 + TAU / 4.0].map(|angle| {
+                        let across = seen.y * angle.cos() - seen.x * angle.sin();
+                        ((across / pitch - 0.5) - (across / pitch - 0.5).round()).abs() * pitch
+                    });
+                    assert!(off[0].min(off[1]) < 0.01, "{chart:?} {pattern:?}: {p}, {off:?}");
+                    judged += 1;
+                }
+                assert!(judged > 10, "{chart:?}: {judged}");
             }
         }
     }
