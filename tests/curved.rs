@@ -125,6 +125,64 @@ fn cones_without_slope_and_endless_spheres_are_planes() {
     }
 }
 
+/// A nozzle that clears steep layers.
+const SLIM: [&str; 6] = [
+    "--set",
+    "nozzle_flat_radius_mm=0.2",
+    "--set",
+    "nozzle_half_angle_deg=10",
+    "--set",
+    "nozzle_block_height_mm=60",
+];
+
+#[test]
+fn flat_tops_are_finished_by_planar_layers() {
+    for (name, top, layers) in [
+        ("cube", 20.0, ["--layers", "conical", "--cone-angle", "30"]),
+        ("gear", 8.0, ["--layers", "conical", "--cone-angle", "-20"]),
+        ("steps", 15.0, ["--layers", "spherical", "--sphere-centre", "-50"]),
+    ] {
+        let mut arguments = vec!["--set", "top=planar", "--set", "fill_density=100%"];
+        arguments.extend(["--set", "skirts=0"]);
+        arguments.extend(layers);
+        arguments.extend(SLIM);
+        let text = sliced(name, &arguments);
+        let motions = motions(&text);
+        let last = motions.iter().filter_map(|motion| motion.layer).max().unwrap();
+        // 0.2 mm apart, the last on the face.
+        for (below, layer) in (0..3).map(|k| (k, last - k)) {
+            let beads = motions.iter().filter(|m| m.lays() && m.layer == Some(layer));
+            let heights: Vec<f64> = beads.map(|motion| motion.to[2]).collect();
+            let wanted = top - 0.2 * below as f64;
+            assert!(!heights.is_empty());
+            assert!(heights.iter().all(|z| (z - wanted).abs() < 1e-3), "{name}: {wanted}");
+        }
+        let highest = motions.iter().filter(|m| m.lays()).map(|m| m.to[2]).fold(0.0, f64::max);
+        assert!((highest - top).abs() < 1e-3, "{name}: {highest}");
+        let wanted = stl_volume(&std::fs::read(model(name)).unwrap());
+        let error = laid(&text) / wanted - 1.0;
+        assert!(error.abs() <= 0.015, "{name}: {:+.2} %", error * 100.0);
+        // Beads of the first planar layer fill the wedges below: half a layer thick at least, and
+        // at most half a layer more than a curved layer is upright.
+        let surface = text.rfind("; layer surface = planar").unwrap();
+        let first = text[surface..].lines().find_map(|line| line.strip_prefix(";LAYER:"));
+        let first: usize = first.unwrap().parse().unwrap();
+        let (mut thinnest, mut thickest) = (f64::MAX, 0.0_f64);
+        for bead in motions.iter().filter(|m| m.lays() && m.layer == Some(first)) {
+            if bead.path() < 0.2 || bead.role != "Perimeter" {
+                continue;
+            }
+            // A bead laid w − t(1 − π/4) apart from its neighbours.
+            let spacing = 0.45 - 0.2 * (1.0 - std::f64::consts::FRAC_PI_4);
+            let thickness = bead.volume() / bead.path() / spacing;
+            thinnest = thinnest.min(thickness);
+            thickest = thickest.max(thickness);
+        }
+        assert!(thinnest > 0.09 && thickest < 0.36, "{name}: {thinnest} to {thickest}");
+        assert!(thickest > 0.25, "{name}: {thickest}");
+    }
+}
+
 #[test]
 fn layers_too_steep_for_the_nozzle_are_refused_or_lowered() {
     let scratch = Scratch::new();

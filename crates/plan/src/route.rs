@@ -307,7 +307,11 @@ impl Router {
         let wanted = speeds.of(line.role, is_first_layer);
         let mut told_area = f64::NAN;
         for pair in line.stations.windows(2).flat_map(|pair| in_even_pieces(&pair[0], &pair[1])) {
-            let (width, area) = mean(&pair[0], &pair[1]);
+            let (width, area) = if line.role == Role::ExternalPerimeter {
+                within(&pair[0], &pair[1])
+            } else {
+                mean(&pair[0], &pair[1])
+            };
             let drift = (area - told_area).abs();
             if drift.is_nan() || drift > AREA_DRIFT * told_area {
                 self.items.push(Item::Step(Step::Bead(program_role(line.role), width)));
@@ -361,6 +365,18 @@ const LEAST_PIECE_MM: f64 = 0.05;
 /// Mean width and cross-section between two stations.
 fn mean(a: &Station, b: &Station) -> (f64, f64) {
     (f64::midpoint(a.bead.width, b.bead.width), f64::midpoint(a.bead.area(), b.bead.area()))
+}
+
+/// Width and cross-section of an outer bead between two stations: the mean, or, on a piece too short
+/// to be cut, little more than the lesser, so that it stays within a place that tapers.
+fn within(a: &Station, b: &Station) -> (f64, f64) {
+    let (width, area) = mean(a, b);
+    let most = a.bead.width.min(b.bead.width) + LARGEST_WIDTH_STEP_MM / 2.0;
+    if width <= most {
+        return (width, area);
+    }
+    let thickness = f64::midpoint(a.bead.thickness, b.bead.thickness);
+    (most, area - thickness * (width - most))
 }
 
 fn program_role(role: Role) -> program::Role {

@@ -116,9 +116,8 @@ pub fn slice(
 
     let (stages, mut layout) = stages(&placed.solid, job)?;
     warnings.extend(layout.warnings(job.schedule.snap));
-    let overhang = stages
-        .last()
-        .filter(|stage| stage.kind != LayerKind::Planar)
+    let curved = stages.iter().find(|stage| stage.kind != LayerKind::Planar);
+    let overhang = curved
         .map(|stage| overhangs(placed.solid.mesh(), &*stage.surface, job.orient.overhang_rad));
     let layers_kind = stages.last().map_or(LayerKind::Planar, |stage| stage.kind);
     let schedule_ms = clock.lap();
@@ -245,12 +244,13 @@ fn layers(
     let mut planner = Planner::new(&job.printer, job.plan);
     let count: usize = stages.iter().map(|stage| stage.printed.len()).sum();
     watch.progress.stage("slice", count as u64);
-    for stage in stages {
+    for (index, stage) in stages.iter().enumerate() {
+        let below = index.checked_sub(1).map(|below| &stages[below]);
         if stages.len() > 1 {
             let surface = format!("{SURFACE_REMARK}{}", stage.kind.describe());
             write(text, &[Step::Remark(surface)])?;
         }
-        let mut stack = Stack::new(solid, stage, job);
+        let mut stack = Stack::new(solid, stage, below, job);
         for start in stage.printed.clone().step_by(WINDOW) {
             watch.interrupt.check()?;
             let window = start..(start + WINDOW).min(stage.printed.end);

@@ -13,6 +13,7 @@ use slicer::level::Level;
 use slicer::lift::Lift;
 use slicer::section::{Cutter, Section, Tears};
 use slicer::skins::{Neighbours, SKIN_TOLERANCE_MM};
+use slicer::stacking::Stair;
 
 use crate::settings::Job;
 use crate::stages::Stage;
@@ -21,6 +22,8 @@ use crate::stages::Stage;
 pub(crate) struct Stack<'a> {
     cutter: Cutter<'a>,
     stage: &'a Stage,
+    /// The curved layers that the first planar one lies on.
+    stair: Option<Stair<'a>>,
     job: &'a Job,
     /// Sections from `first` on, each with a thinned-out copy for comparing layers.
     sections: VecDeque<(Section, Region)>,
@@ -28,11 +31,17 @@ pub(crate) struct Stack<'a> {
 }
 
 impl<'a> Stack<'a> {
-    pub(crate) fn new(solid: &'a Solid, stage: &'a Stage, job: &'a Job) -> Self {
+    pub(crate) fn new(
+        solid: &'a Solid,
+        stage: &'a Stage,
+        below: Option<&'a Stage>,
+        job: &'a Job,
+    ) -> Self {
         let cutter = Cutter::new(solid, &*stage.surface, &stage.levels);
         let skins = &job.paths.skins;
         let first = stage.printed.start.saturating_sub(skins.bottom_layers.max(1));
-        Self { cutter, stage, job, sections: VecDeque::new(), first }
+        let stair = below.and_then(|below| below.stair(&stage.levels[stage.printed.start]));
+        Self { cutter, stage, stair, job, sections: VecDeque::new(), first }
     }
 
     /// Cuts what is missing for a window and drops what no later window needs; `torn` sees every
@@ -66,8 +75,10 @@ impl<'a> Stack<'a> {
     }
 
     fn fill_one(&self, k: usize) -> Filled {
-        let Stage { surface, levels, floor, .. } = self.stage;
-        let lift = Lift { surface: &**surface, level: levels[k], floor: *floor };
+        let Stage { surface, levels, floor, ceiling, .. } = self.stage;
+        let stair = self.stair.filter(|_| k == self.stage.printed.start);
+        let lift =
+            Lift { surface: &**surface, level: levels[k], floor: *floor, ceiling: *ceiling, stair };
         let region = &self.sections[k - self.first].0.region;
         if surface.form().is_flat() {
             let (above, below) = self.beside(k);
@@ -76,13 +87,18 @@ impl<'a> Stack<'a> {
                 above: above.iter().map(at).collect(),
                 below: below.iter().map(at).collect(),
             };
+            // Cones without slope are planes that may begin and end anywhere.
+            if floor.is_some() || ceiling.is_some() {
+                let material = lift.printable(region);
+                return fill_layer(&lift, &material, &neighbours, &self.job.paths);
+            }
             return fill_layer(&lift, region, &neighbours, &self.job.paths);
         }
         // The nozzle runs on the upper side, and that is where regions are compared.
         let upper = levels[k].upper;
         let to_upper =
             |region: &Region, level: &Level| carried(lift.surface, region, level.middle(), upper);
-        let material = lift.above_floor(&to_upper(region, &levels[k]));
+        let material = lift.printable(&to_upper(region, &levels[k]));
         if material.is_empty() {
             return Filled::default();
         }

@@ -3,21 +3,28 @@
 //! A planar print has one. A curved one begins with some planar layers on the bed
 //! (`base_layers`), whose upper side is the floor that the curved layers begin on.
 //!
+//! With `top = planar` the curved layers end below the flat face on top of the part, and planar ones
+//! finish it: the first of them fills the wedges between the curved layers and its own plane, and
+//! the last ends on the face.
+//!
 //! A stage knows more levels than it prints: what lies beyond is cut all the same, because it
 //! decides where the printed ones are bottoms and tops. The base is part of the same solid, so its
 //! layers and the curved ones need not know of each other.
 
 use std::ops::Range;
 
+use mesh::flats::Facing;
 use mesh::mesh::Mesh;
 use mesh::topology::Solid;
 use nalgebra::Point3;
 use slicer::clearance::{LayerOrder, Uphill, steepest_slope};
 use slicer::level::Level;
+use slicer::lift::LEAST_WEDGE_SHARE;
+use slicer::stacking::Stair;
 use slicer::surface::{Caps, Cone, Extent, LayerSurface, Plane, Spheres, SurfaceError};
 
 use crate::failure::Failure;
-use crate::levels::{self, Layout};
+use crate::levels::{self, Layout, MetFlat};
 use crate::settings::Job;
 
 /// The surface that layers follow, as the user names it.
@@ -80,6 +87,25 @@ pub struct Stage {
     /// The flat floor that the printed ones begin on, mm; `None` where they begin on the bed and
     /// are flat themselves.
     pub floor: Option<f64>,
+    /// The height that the printed ones end at, mm; `None` where the part ends them.
+    pub ceiling: Option<f64>,
+}
+
+impl Stage {
+    /// What the curved layers of this stage are to a planar layer on top of them; `None` for other
+    /// stages.
+    pub(crate) fn stair(&self, first: &Level) -> Option<Stair<'_>> {
+        let (floor, ceiling) = (self.floor?, self.ceiling?);
+        let level = self.levels.get(self.printed.start)?;
+        Some(Stair {
+            surface: &*self.surface,
+            level: level.upper,
+            step: level.thickness(),
+            floor,
+            top: first.upper,
+            least: first.upper - ceiling,
+        })
+    }
 }
 
 /// Lays out the stages of a part that stands on the bed, and says which flat faces they meet.
@@ -98,6 +124,7 @@ pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure>
             printed: 0..levels.len(),
             levels,
             floor: None,
+            ceiling: None,
         };
         return Ok((vec![planar], layout));
     }
@@ -106,9 +133,52 @@ pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure>
     surface.fits(&extent(part)).map_err(|error| unfit(&error))?;
     let base = base(job);
     let floor = base.printed.end.checked_sub(1).map_or(0.0, |last| base.levels[last].upper);
-    let curved = Stage { kind, ..curved(part, surface, floor, job)? };
-    Ok((vec![base, curved], Layout { flats: Vec::new(), ..layout }))
+    let mut curved = Stage { kind, ..curved(part, surface, floor, job)? };
+    let top = flat_top(&layout, part).filter(|_| job.planar_top);
+    let Some(finish) = top.and_then(|top| finish(top, floor, job)) else {
+        return Ok((vec![base, curved], Layout { flats: Vec::new(), ..layout }));
+    };
+    let first = &finish.levels[finish.printed.start];
+    curved.ceiling = Some(first.upper - LEAST_WEDGE_SHARE * first.thickness());
+    // The other faces are met by no layer on purpose.
+    let on_top = |met: &&MetFlat| is_top(met, part);
+    let flats = layout.flats.iter().filter(on_top).map(|met| MetFlat { miss: 0.0, ..*met });
+    let layout = Layout { flats: flats.collect(), ..layout };
+    Ok((vec![base, curved, finish], layout))
 }
+
+/// How far a flat face may lie from the highest point of the part and be its top, mm: what its own
+/// vertices differ by.
+const TOP_MM: f64 = 1e-3;
+
+fn is_top(met: &MetFlat, part: &Mesh) -> bool {
+    met.flat.facing == Facing::Up && (met.flat.z_mm - part.bounds().max.z).abs() <= TOP_MM
+}
+
+/// The height of the flat face on top of a part.
+fn flat_top(layout: &Layout, part: &Mesh) -> Option<f64> {
+    layout.flats.iter().find(|met| met.wanted && is_top(met, part)).map(|met| met.flat.z_mm)
+}
+
+/// The planar layers that end at `top`; `None` where no curved layer would fit below them.
+fn finish(top: f64, floor: f64, job: &Job) -> Option<Stage> {
+    let height = job.schedule.layer_height;
+    let skins = &job.paths.skins;
+    let (count, below) = (skins.top_layers.max(1), skins.bottom_layers.max(1));
+    if top - height * (count + LEAST_CURVED) as f64 <= floor {
+        return None;
+    }
+    let printed = below..below + count;
+    let bound = |k: usize| top - height * (printed.end as f64 - k as f64);
+    let levels = (0..printed.end + skins.top_layers.max(1))
+        .map(|k| Level { index: job.base_layers.max(1) + k, lower: bound(k), upper: bound(k + 1) })
+        .collect();
+    let kind = LayerKind::Planar;
+    Some(Stage { surface: Box::new(Plane), kind, levels, printed, floor: None, ceiling: None })
+}
+
+/// Fewer curved layers than this between floor and planar top are not worth it.
+const LEAST_CURVED: usize = 2;
 
 /// How deep the nozzle may press into what is laid, mm: a quarter of a usual layer, which a soft
 /// bead gives way by.
@@ -171,7 +241,14 @@ fn base(job: &Job) -> Stage {
         .map(|index| Level { index, lower: bound(index), upper: bound(index + 1) })
         .collect();
     let kind = LayerKind::Planar;
-    Stage { surface: Box::new(Plane), kind, levels, printed: 0..job.base_layers, floor: None }
+    Stage {
+        surface: Box::new(Plane),
+        kind,
+        levels,
+        printed: 0..job.base_layers,
+        floor: None,
+        ceiling: None,
+    }
 }
 
 fn curved(
@@ -203,5 +280,5 @@ fn curved(
             upper: bound(k + 1),
         })
         .collect();
-    Ok(Stage { surface, kind: job.layers, levels, printed, floor: Some(floor) })
+    Ok(Stage { surface, kind: job.layers, levels, printed, floor: Some(floor), ceiling: None })
 }

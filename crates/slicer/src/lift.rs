@@ -11,7 +11,7 @@ use nalgebra::{Point2, Point3, center};
 
 use crate::bead::Bead;
 use crate::level::Level;
-use crate::stacking::WedgeRule;
+use crate::stacking::{Stair, WedgeRule};
 use crate::surface::LayerSurface;
 use crate::toolpath::Station;
 
@@ -25,6 +25,9 @@ const EVEN_SHARE: f64 = 0.02;
 /// Pieces are not cut shorter than this, mm.
 const SHORTEST_MM: f64 = 0.05;
 
+/// Rounding of a height, mm: a layer that just reaches the ceiling is laid.
+const CEILING_SLACK_MM: f64 = 1e-6;
+
 /// The least printable thickness of a wedge, as a share of the layer's.
 pub const LEAST_WEDGE_SHARE: f64 = 0.5;
 
@@ -37,6 +40,10 @@ pub struct Lift<'a> {
     pub level: Level,
     /// Height of the flat floor that the layer begins on, mm; `None` where it has none.
     pub floor: Option<f64>,
+    /// Height that no place of the layer's upper side is above, mm; `None` where it has none.
+    pub ceiling: Option<f64>,
+    /// The curved layers that a planar one lies on.
+    pub stair: Option<Stair<'a>>,
 }
 
 impl Lift<'_> {
@@ -49,6 +56,9 @@ impl Lift<'_> {
     /// Returns how thick a bead is at a point of the upper side, mm; zero where none is laid.
     #[must_use]
     pub fn thickness(&self, at: &Point3<f64>) -> f64 {
+        if let Some(stair) = &self.stair {
+            return stair.thickness(at.x.hypot(at.y));
+        }
         let step = self.level.thickness();
         let full = step * self.surface.thickness_per_level(at);
         let Some(base) = self.floor else { return full };
@@ -56,19 +66,32 @@ impl Lift<'_> {
         rule.thickness(self.surface, at, step)
     }
 
-    /// Returns the part of a region of the chart where the layer is thick enough to be laid.
+    /// Returns the part of a region of the chart where the layer is thick enough to be laid, and
+    /// below its ceiling.
     #[must_use]
-    pub fn above_floor(&self, region: &Region) -> Region {
-        let (Some(_), Some(bounds)) = (self.floor, region.bounds()) else { return region.clone() };
+    pub fn printable(&self, region: &Region) -> Region {
+        let laid = self.where_holds(region, self.floor.is_some(), |p| self.thickness(p) > 0.0);
+        let ceiling = self.ceiling.unwrap_or(f64::INFINITY) + CEILING_SLACK_MM;
+        self.where_holds(&laid, self.ceiling.is_some(), |p| p.z <= ceiling)
+    }
+
+    /// The part of a region where a condition holds that changes once on the meridian: layers fall
+    /// outwards all the way, or rise.
+    fn where_holds(
+        &self,
+        region: &Region,
+        is_limited: bool,
+        holds: impl Fn(&Point3<f64>) -> bool,
+    ) -> Region {
+        let (true, Some(bounds)) = (is_limited, region.bounds()) else { return region.clone() };
         let corner = |p: GridPoint| mm(p).coords.abs();
         let reach = corner(bounds.min).sup(&corner(bounds.max)).norm();
-        let is_laid = |s: f64| self.thickness(&self.point(&Point2::new(s, 0.0))) > 0.0;
-        match (is_laid(0.0), is_laid(reach)) {
+        let holds_at = |s: f64| holds(&self.point(&Point2::new(s, 0.0)));
+        match (holds_at(0.0), holds_at(reach)) {
             (true, true) => region.clone(),
             (false, false) => Region::default(),
-            // Layers fall outwards, or rise: on the meridian the floor is met once.
-            (true, false) => region.intersection(&disc(border(0.0, reach, is_laid))),
-            (false, true) => region.difference(&disc(border(reach, 0.0, is_laid))),
+            (true, false) => region.intersection(&disc(border(0.0, reach, holds_at))),
+            (false, true) => region.difference(&disc(border(reach, 0.0, holds_at))),
         }
     }
 
@@ -87,9 +110,14 @@ impl Lift<'_> {
         stations
     }
 
+    /// Whether lines stay straight and beads as thick as the layer.
+    fn is_even(&self) -> bool {
+        self.floor.is_none() && self.stair.is_none() && self.surface.form().is_flat()
+    }
+
     fn station(&self, uv: &Point2<f64>, bead: Bead) -> Station {
         let at = self.point(uv);
-        if self.floor.is_none() && self.surface.form().is_flat() {
+        if self.is_even() {
             return Station { at, bead };
         }
         let thickness = self.thickness(&at);
@@ -106,7 +134,7 @@ impl Lift<'_> {
         to: &(Point2<f64>, Bead),
         stations: &mut Vec<Station>,
     ) {
-        if self.surface.form().is_flat() {
+        if self.is_even() {
             return;
         }
         let ends = [self.station(&from.0, from.1), self.station(&to.0, to.1)];
@@ -179,7 +207,7 @@ mod tests {
     #[test]
     fn flat_lines_keep_their_points() {
         let level = Level { index: 3, lower: 0.6, upper: 0.8 };
-        let lift = Lift { surface: &Plane, level, floor: None };
+        let lift = Lift { surface: &Plane, level, floor: None, ceiling: None, stair: None };
         let stations = lift.stations(&line(&[[-8.0, 1.0], [8.0, 1.0], [0.0, 9.0]]), true);
         assert_eq!(stations.len(), 3);
         assert!(stations.iter().all(|s| s.bead == BEAD && s.at.z == 0.8));
@@ -192,7 +220,7 @@ mod tests {
         let families: [(&dyn LayerSurface, f64); 2] = [(&cone, 0.5_f64.cos()), (&spheres, 1.0)];
         for (surface, cos) in families {
             let level = Level { index: 0, lower: 20.0, upper: 20.0 + 0.2 / cos };
-            let lift = Lift { surface, level, floor: None };
+            let lift = Lift { surface, level, floor: None, ceiling: None, stair: None };
             let stations = lift.stations(&line(&[[-12.0, 3.0], [9.0, 3.0], [4.0, -11.0]]), false);
             assert!((20..400).contains(&stations.len()), "{}", stations.len());
             for pair in stations.windows(2) {
@@ -212,7 +240,7 @@ mod tests {
         let cone = Cone::new(angle).unwrap();
         let step = 0.2 / angle.cos();
         let level = Level { index: 0, lower: 5.0 - step, upper: 5.0 };
-        let lift = Lift { surface: &cone, level, floor: Some(0.4) };
+        let lift = Lift { surface: &cone, level, floor: Some(0.4), ceiling: None, stair: None };
         let at = |z: f64| Point3::new((5.0 - z) / angle.tan(), 0.0, z);
         assert!((lift.thickness(&at(3.0)) - 0.2).abs() < 1e-6);
         // tau of 0.15 mm: 0.13 mm above the floor.

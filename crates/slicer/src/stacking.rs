@@ -70,6 +70,50 @@ impl WedgeRule {
     }
 }
 
+/// The curved layers that end below a flat top: where each place of the first planar layer above
+/// them finds its ground.
+///
+/// A curved layer is laid where its upper side lies at least the least thickness below the top of
+/// that planar layer, which takes over what is missing: its beads are from `least` to `least` and a
+/// curved layer, measured upright, thick.
+#[derive(Clone, Copy)]
+pub struct Stair<'a> {
+    /// The family of the curved layers.
+    pub surface: &'a dyn LayerSurface,
+    /// The upper level of one of them, mm.
+    pub level: f64,
+    /// Difference of the levels of neighbours, mm.
+    pub step: f64,
+    /// Height of the flat floor that the curved layers stand on, mm: there is no deeper ground.
+    pub floor: f64,
+    /// Height of the upper side of the first planar layer, mm.
+    pub top: f64,
+    /// The least thickness of a bead of it, mm.
+    pub least: f64,
+}
+
+impl Stair<'_> {
+    /// Returns up to which height curved layers are laid, mm.
+    #[must_use]
+    pub fn ceiling(&self) -> f64 {
+        self.top - self.least
+    }
+
+    /// Returns how far the highest curved layer lies below the top at distance `r` from the axis,
+    /// mm.
+    #[must_use]
+    pub fn thickness(&self, r: f64) -> f64 {
+        let highest = self.surface.level(&Point3::new(r, 0.0, self.ceiling()));
+        let steps = ((highest - self.level) / self.step + STEP_SLACK).floor();
+        let ground = self.surface.height(self.level + steps * self.step, r);
+        let ground = if ground.is_finite() { ground.max(self.floor) } else { self.floor };
+        self.top - ground
+    }
+}
+
+/// Rounding of a level, as a share of a step: a layer that just reaches the ceiling is laid.
+const STEP_SLACK: f64 = 1e-6;
+
 /// A piece of a line along which the thickness changes evenly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WedgePiece {
@@ -133,4 +177,37 @@ pub fn blend(
         layers.push(BlendLayer { level, cone });
     }
     Ok(layers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::{Caps, Spheres};
+
+    #[test]
+    fn the_layer_on_a_stair_takes_what_curved_layers_leave() {
+        let cone = Cone::new(0.5).unwrap();
+        let bowl = Cone::new(-0.7).unwrap();
+        let spheres = Spheres::new(-30.0).unwrap();
+        let caps = Caps::new(60.0).unwrap();
+        let families: [&dyn LayerSurface; 4] = [&cone, &bowl, &spheres, &caps];
+        for surface in families {
+            let (step, top, least) = (surface.level_step(0.2), 12.0, 0.1);
+            let stair = Stair { surface, level: 3.07, step, floor: 0.4, top, least };
+            for k in 0..200 {
+                let r = f64::from(k) * 0.1;
+                let thickness = stair.thickness(r);
+                let ground = top - thickness;
+                // The ground is a curved layer that is laid, and the next one is not.
+                let level = surface.level(&Point3::new(r, 0.0, ground));
+                let steps = (level - 3.07) / step;
+                assert!((steps - steps.round()).abs() < 1e-6, "{r}: {steps}");
+                assert!(ground <= stair.ceiling() + 1e-6 && thickness >= least - 1e-6);
+                assert!(surface.height(level + step, r) > stair.ceiling());
+            }
+        }
+        let low =
+            Stair { surface: &cone, level: 0.6, step: 0.23, floor: 0.4, top: 0.7, least: 0.1 };
+        assert!((low.thickness(8.0) - 0.3).abs() < 1e-12, "there is nothing below the floor");
+    }
 }

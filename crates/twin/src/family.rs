@@ -101,6 +101,34 @@ impl Family {
         (Vector3::z() + outward * rise).normalize()
     }
 
+    /// Returns the place `distance` mm from `p` along its layer, on the geodesic that leaves it along
+    /// `direction`, a unit vector in the layer; on spheres straight on, which a bead's width away is
+    /// the same.
+    #[must_use]
+    pub(crate) fn walk(
+        &self,
+        p: &Point3<f64>,
+        direction: &Vector3<f64>,
+        distance: f64,
+    ) -> Point3<f64> {
+        let r = p.x.hypot(p.y);
+        let Self::Conical { slope } = *self else { return p + direction * distance };
+        if r == 0.0 {
+            return p + direction * distance;
+        }
+        // On the unrolled cone the way is straight.
+        let cos = 1.0 / slope.hypot(1.0);
+        let outward = Vector3::new(p.x, p.y, 0.0) / r;
+        let across = Vector3::new(-outward.y, outward.x, 0.0);
+        let ruling = (outward - Vector3::z() * slope) * cos;
+        let x = r / cos + distance * direction.dot(&ruling);
+        let y = distance * direction.dot(&across);
+        let (sin, cosine) = (y.atan2(x) / cos).sin_cos();
+        let to = x.hypot(y) * cos;
+        let at = (outward * cosine + across * sin) * to;
+        Point3::new(at.x, at.y, p.z - slope * (to - r))
+    }
+
     /// Returns how thick a layer is at a point, along its normal, per mm of level.
     #[must_use]
     pub fn thickness_per_level(&self, p: &Point3<f64>) -> f64 {
@@ -150,6 +178,24 @@ mod tests {
         assert_eq!(read(" layer surface = wavy, angle 3"), None);
         assert_eq!(read(" layer surface = conical, angle x"), None);
         assert_eq!(read("TYPE:Perimeter"), None);
+    }
+
+    #[test]
+    fn ways_stay_on_their_cone() {
+        let cone = Family::Conical { slope: 0.8 };
+        let p = Point3::new(0.2, 0.1, cone.height(5.0, 0.2_f64.hypot(0.1)));
+        for turn in [0.0, 1.0, 2.5, 4.0_f64] {
+            let normal = cone.normal(&p);
+            let side = normal.cross(&Vector3::x()).normalize();
+            let direction = side * turn.cos() + normal.cross(&side) * turn.sin();
+            for distance in [-0.3, 0.05, 0.3] {
+                let to = cone.walk(&p, &direction, distance);
+                assert!((cone.level(&to) - 5.0).abs() < 1e-12);
+                assert!((to - p).norm() <= distance.abs() + 1e-12);
+            }
+            let near = cone.walk(&p, &direction, 1e-6);
+            assert!((near - p - direction * 1e-6).norm() < 1e-10);
+        }
     }
 
     #[test]

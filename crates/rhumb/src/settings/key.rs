@@ -686,6 +686,13 @@ pub const KEYS: &[Key] = &[
         "radius of the sphere whose cap is lifted",
     ),
     count(Print, "base_layers", (2, 0, 1000), "planar layers under curved ones"),
+    choice(
+        Print,
+        "top",
+        &["curved", "planar"],
+        "whether the flat face on top of a part in curved layers is left to them, which shows as \
+         steps, or finished by planar layers",
+    ),
     number(Print, "layer_height_mm", "layer_height", (0.2, 0.01, 2.0), "thickness of a layer"),
     number(
         Print,

@@ -1,7 +1,7 @@
 //! Regions and points taken from one layer to another, along the normals.
 
 use geom::grid::{mm, snap};
-use geom::polyline::distance_to_segment;
+use geom::polyline::{distance_to_segment, share_nearest};
 use geom::region::{Fill, Region, Ring, ring_sides};
 use nalgebra::Point2;
 
@@ -45,13 +45,46 @@ pub(super) fn image_of(region: &Region, image: impl Fn(&Point2<f64>) -> Point2<f
                 let (a, b) = (mm(a), mm(b));
                 let ends = (image(&a), image(&b));
                 carried.push(snap(&ends.0));
-                side((&a, &b), (&ends.0, &ends.1), &image, &mut carried);
+                let Some(foot) = foot(&a, &b) else {
+                    side((&a, &b), (&ends.0, &ends.1), &image, &mut carried);
+                    continue;
+                };
+                let at = image(&foot);
+                side((&a, &foot), (&ends.0, &at), &image, &mut carried);
+                carried.push(snap(&at));
+                side((&foot, &b), (&at, &ends.1), &image, &mut carried);
             }
             carried
         })
         .collect();
     Region::from_grid_rings(&rings, Fill::Positive)
 }
+
+/// The place where a side passes the axis, if it passes so near that its image may be bent sharply
+/// there. On the axis it has no azimuth and is taken to lie to the left of the side, where material
+/// is: what is in doubt is left out.
+fn foot(a: &Point2<f64>, b: &Point2<f64>) -> Option<Point2<f64>> {
+    let share = share_nearest(a, b, &Point2::origin());
+    let along = b - a;
+    let foot = a + along * share;
+    let is_near = foot.coords.norm_squared() < NEAR_AXIS_MM * NEAR_AXIS_MM;
+    if !(is_near && 0.0 < share && share < 1.0) {
+        return None;
+    }
+    let left = nalgebra::Vector2::new(-along.y, along.x).normalize() * OFF_AXIS_MM;
+    Some(if foot.coords.norm_squared() < OFF_AXIS_MM * OFF_AXIS_MM {
+        Point2::from(left)
+    } else {
+        foot
+    })
+}
+
+/// Layers are carried by half their thickness or a few of them; only nearer to the axis than that
+/// are images bent, mm.
+const NEAR_AXIS_MM: f64 = 2.0;
+
+/// Nearer to the axis than this a place has no azimuth to speak of, mm: a grid step.
+const OFF_AXIS_MM: f64 = 1e-5;
 
 /// Appends points of the image of a side until chords are near enough.
 fn side(

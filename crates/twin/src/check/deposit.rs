@@ -173,13 +173,17 @@ impl Deposit {
             return;
         }
         for sample in &self.samples {
-            let depth = self.family.normal(&sample.middle) * self.half_height;
-            let is_outside = |aside: f64| solid.columns.winding(&(sample.at(aside) - depth)) == 0;
+            // Along the layer, which near the apex of a cone is far from straight.
+            let at = |aside: f64| {
+                let p = self.family.walk(&sample.middle, &sample.side, aside);
+                p - self.family.normal(&p) * self.half_height
+            };
+            let is_outside = |aside: f64| solid.columns.winding(&at(aside)) == 0;
             let Some(sign) = [1.0, -1.0].into_iter().find(|sign| is_outside(sample.inner() * sign))
             else {
                 continue;
             };
-            let edge = sample.at(sign * sample.half_width) - depth;
+            let edge = at(sign * sample.half_width);
             let out = solid.nearest.distance(&edge, FAR_OUT);
             if !exceeds(out, STICK_OUT + SLACK) {
                 continue;

@@ -7,7 +7,8 @@
 //! * One by one they may differ by [`DRIFT`], as a width that changes along a line is announced in
 //!   steps, and by the volumes [`BLOB`] and [`LACK`], which nobody sees.
 //! * Beads of curved layers may be from [`THINNEST`] to [`THICKEST`] of their layer, as wedges on a
-//!   flat floor are.
+//!   flat floor are. So may those of the first planar layer on curved ones, which fills the wedges
+//!   that these leave below it; along their normal, that is.
 //!
 //! No line asks for more volume in a second than melts.
 //!
@@ -68,6 +69,8 @@ pub(crate) struct Flow {
     /// Nearer to the axis nothing is judged, mm.
     round_axis: f64,
     mark: Option<LayerMark>,
+    /// The curved family that this planar layer lies on.
+    ground: Option<Family>,
     /// Length of the planar beads of each role by their share of what is announced.
     classes: [Vec<f64>; Role::ALL.len()],
 }
@@ -82,11 +85,16 @@ impl Flow {
             volume_per_second,
             round_axis,
             mark: None,
+            ground: None,
             classes: Default::default(),
         }
     }
 
     pub(crate) fn layer(&mut self, mark: LayerMark) {
+        let family = |mark: LayerMark| mark.family.unwrap_or_default();
+        let before = self.mark.map(family).unwrap_or_default();
+        let begins = family(mark) == Family::Planar && before != Family::Planar;
+        self.ground = begins.then_some(before);
         self.mark = Some(mark);
     }
 
@@ -106,8 +114,11 @@ impl Flow {
             + FILAMENT / segment.filament
             + (area(segment.width + WIDTH, height) / announced - 1.0);
         let is_planar = mark.family.unwrap_or_default() == Family::Planar;
-        let [least, most] =
-            if is_planar { [1.0 - DRIFT, 1.0 + DRIFT] } else { [THINNEST, THICKEST] };
+        let [least, most] = match self.ground {
+            _ if !is_planar => [THINNEST, THICKEST],
+            Some(ground) => [THINNEST, THICKEST / ground.normal(&segment.middle).z],
+            None => [1.0 - DRIFT, 1.0 + DRIFT],
+        };
         let volume = announced * segment.path;
         let over = (share - most - rounded) * volume;
         let under = (least - rounded - share) * volume;
@@ -121,7 +132,8 @@ impl Flow {
             });
         }
         let role = Role::ALL.iter().position(|role| *role == segment.role);
-        if let Some(role) = role.filter(|_| is_planar && share.is_finite()) {
+        if let Some(role) = role.filter(|_| is_planar && self.ground.is_none() && share.is_finite())
+        {
             let class = (share.min(THICKEST) / CLASS) as usize;
             let classes = &mut self.classes[role];
             if classes.len() <= class {
