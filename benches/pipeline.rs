@@ -61,7 +61,13 @@ fn filled(model: &Model, covers: &[Region], job: &Job) -> usize {
             below: covers[k.saturating_sub(skins.bottom_layers)..k].iter().rev().collect(),
         };
         let material = &model.sections[k];
-        let lift = Lift { surface: &Plane, level: model.levels[k], floor: None };
+        let lift = Lift {
+            surface: &Plane,
+            level: model.levels[k],
+            floor: None,
+            ceiling: None,
+            stair: None,
+        };
         fill_layer(&lift, material, &neighbours, &job.paths).paths.islands.len()
     };
     (0..covers.len()).into_par_iter().map(layer).sum()

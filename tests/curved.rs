@@ -183,6 +183,50 @@ fn flat_tops_are_finished_by_planar_layers() {
     }
 }
 
+/// The report of a model sliced with the full proof, and how it ended.
+fn proved(name: &str, layers: &[&str]) -> (serde_json::Value, i32) {
+    let (scratch, model) = (Scratch::new(), model(name));
+    let mut arguments = vec!["slice", model.to_str().unwrap(), "-o", "out.gcode", "--json"];
+    arguments.extend(["--verify", "full"]);
+    arguments.extend(layers);
+    arguments.extend(SLIM);
+    let ran = scratch.run(&arguments);
+    (serde_json::from_str(&ran.out).unwrap_or_else(|_| panic!("{}", ran.err)), ran.code.unwrap())
+}
+
+#[test]
+fn beads_stay_within_the_part_at_the_axis_and_at_shallow_faces() {
+    for (name, layers) in [
+        ("cone", ["--layers=conical", "--cone-angle=-15"]),
+        ("dome", ["--layers=conical", "--cone-angle=-30"]),
+        ("lens", ["--layers=conical", "--cone-angle=-45"]),
+        ("wall-0.6", ["--layers=conical", "--cone-angle=45"]),
+        ("wall-0.6", ["--layers=conical", "--cone-angle=-30"]),
+        ("gear", ["--layers=conical", "--cone-angle=45"]),
+        ("gear", ["--layers=caps", "--cap-radius=80"]),
+    ] {
+        let (report, code) = proved(name, &layers);
+        assert_eq!(code, 0, "{name} {layers:?}: {}", report["verify"]);
+    }
+}
+
+#[test]
+fn islands_in_mid_air_are_reported_with_their_place() {
+    // The arms of the cross begin at 20 mm, in bowls at their outer corners.
+    let (report, _) = proved("cross", &["--layers=conical", "--cone-angle=-15"]);
+    let floating = report["layers"]["floating"].as_array().unwrap();
+    assert!(floating.len() >= 4, "{floating:?}");
+    for island in floating {
+        let at: Vec<f64> = (0..3).map(|k| island["at_mm"][k].as_f64().unwrap()).collect();
+        assert!((at[2] - 20.0).abs() < 0.4, "{island}");
+        assert!(at[0].abs().max(at[1].abs()) > 25.0, "{island}");
+        assert!(island["area_mm2"].as_f64().unwrap() > 0.0);
+        assert!(island["layer"].as_u64().unwrap() > 10);
+    }
+    let (whole, _) = proved("cube", &["--layers=conical", "--cone-angle=20"]);
+    assert_eq!(whole["layers"]["floating"], serde_json::json!([]));
+}
+
 #[test]
 fn layers_too_steep_for_the_nozzle_are_refused_or_lowered() {
     let scratch = Scratch::new();

@@ -17,7 +17,7 @@ use mesh::stl;
 use mesh::topology::Solid;
 use nalgebra::Rotation3;
 use plan::planner::{Planner, Totals};
-use slicer::layer::Filled;
+use slicer::layer::{Filled, Floating};
 use slicer::level::Level;
 use slicer::section::Tears;
 use slicer::toolpath::LostArea;
@@ -75,6 +75,8 @@ pub struct Outcome {
     pub heights: Vec<f64>,
     /// What hangs over, when layers are curved.
     pub overhang: Option<Overhang>,
+    /// The islands that begin in mid-air, each with its layer; part frame.
+    pub floating: Vec<(usize, Floating)>,
     /// The sums of the program.
     pub totals: Totals,
     /// Area that no bead fits in.
@@ -132,6 +134,9 @@ pub fn slice(
     program_text::head(&mut text, request.name, request.made_at, &thumbnail, &job.start)
         .map_err(written)?;
     let mut printed = layers(&upright, &stages, &job, &mut text, watch)?;
+    for (_, island) in &mut printed.floating {
+        island.at = turned.inverse() * island.at;
+    }
     layout.levels = std::mem::take(&mut printed.levels);
     program_text::tail(
         &mut text,
@@ -151,7 +156,7 @@ pub fn slice(
         slice: clock.lap(),
         ..Timings::default()
     };
-    let Printed { totals, lost, heights, .. } = printed;
+    let Printed { totals, lost, heights, floating, .. } = printed;
     Ok(Outcome {
         health,
         placed,
@@ -159,6 +164,7 @@ pub fn slice(
         layers: layers_kind,
         heights,
         overhang,
+        floating,
         totals,
         lost,
         warnings,
@@ -225,7 +231,8 @@ struct Printed {
     lost_volume: f64,
     tears: Tears,
     torn_layers: usize,
-    floating: Option<(usize, f64)>,
+    /// Islands that begin in mid-air, with their layer; places in the frame that turns with the part.
+    floating: Vec<(usize, Floating)>,
     adhesion_out_of_reach: usize,
     /// The layers that were printed.
     levels: Vec<Level>,
@@ -320,9 +327,7 @@ impl Printed {
         if lost.worst_area > self.lost.worst_area {
             (self.lost.worst_area, self.lost.worst) = (lost.worst_area, lost.worst);
         }
-        if filled.floating_area > 0.0 && self.floating.is_none() {
-            self.floating = Some((index, filled.floating_area));
-        }
+        self.floating.extend(filled.floating.iter().map(|island| (index, *island)));
         self.adhesion_out_of_reach += filled.adhesion_out_of_reach;
     }
 
@@ -341,10 +346,18 @@ impl Printed {
                 ),
             );
         }
-        if let Some((layer, area)) = self.floating {
+        if let Some((layer, Floating { at, area })) = self.floating.first() {
+            let more = match self.floating.len() - 1 {
+                0 => String::new(),
+                more => format!(" ({more} more such places are in the report)"),
+            };
             warn(
                 "FloatingPart",
-                format!("layer {layer} begins {area:.2} mm² in mid-air, with nothing below"),
+                format!(
+                    "layer {layer} begins {area:.2} mm² in mid-air at x {:.2} y {:.2} z {:.2}, with \
+                     nothing below{more}",
+                    at.x, at.y, at.z
+                ),
             );
         }
         if self.torn_layers > 0 {

@@ -104,6 +104,19 @@ pub struct Layers {
     /// Area that hangs over with these layers; only for curved ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub overhang_mm2: Option<f64>,
+    /// Islands that begin in mid-air, with nothing below.
+    pub floating: Vec<FloatingIsland>,
+}
+
+/// An island that begins in mid-air.
+#[derive(Debug, Clone, Serialize)]
+pub struct FloatingIsland {
+    /// Its layer, counted from 0.
+    pub layer: usize,
+    /// Its lowest place, part frame.
+    pub at_mm: [f64; 3],
+    /// Its area.
+    pub area_mm2: f64,
 }
 
 /// A flat face.

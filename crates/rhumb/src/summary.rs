@@ -11,7 +11,8 @@ use crate::pipeline::{Outcome, part};
 use crate::place::volume;
 use crate::program_text::duration;
 use crate::report::{
-    Layers, MeshHealth, Model, Orientation, OrientationCandidate, Print, Report, Verify,
+    FloatingIsland, Layers, MeshHealth, Model, Orientation, OrientationCandidate, Print, Report,
+    Verify,
 };
 use crate::settings::Job;
 use machine::gcode::decimal;
@@ -54,6 +55,7 @@ pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Jo
             lost_mm2: outcome.lost.area,
             overhang_planar_mm2: outcome.overhang.map(|overhang| tidy(overhang.planar)),
             overhang_mm2: outcome.overhang.map(|overhang| tidy(overhang.chosen)),
+            floating: floating(outcome),
         },
         print: Print {
             time_s: totals.time,
@@ -70,6 +72,15 @@ pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Jo
         timings_ms: outcome.timings.clone(),
         warnings: outcome.warnings.clone(),
     }
+}
+
+fn floating(outcome: &Outcome) -> Vec<FloatingIsland> {
+    let islands = outcome.floating.iter().map(|(layer, island)| FloatingIsland {
+        layer: *layer,
+        at_mm: [tidy(island.at.x), tidy(island.at.y), tidy(island.at.z)],
+        area_mm2: tidy(island.area),
+    });
+    islands.collect()
 }
 
 /// A level without the noise of its last bits.

@@ -2,7 +2,7 @@
 
 use geom::grid::{GridPoint, mm};
 use geom::region::{Fill, Island, Region};
-use nalgebra::Point2;
+use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
 
 use crate::adhesion::{AdhesionParams, around};
@@ -39,8 +39,17 @@ pub struct Filled {
     pub paths: LayerPaths,
     /// Loops of skirt and brim that the reach of the machine left out.
     pub adhesion_out_of_reach: usize,
-    /// Area of the islands that begin in mid-air, mm².
-    pub floating_area: f64,
+    /// The islands that begin in mid-air.
+    pub floating: Vec<Floating>,
+}
+
+/// An island with nothing at all below it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Floating {
+    /// The lowest place of its outline, part frame: there it begins.
+    pub at: Point3<f64>,
+    /// mm².
+    pub area: f64,
 }
 
 /// Fills the material of one layer; regions are in its chart.
@@ -70,7 +79,8 @@ pub fn fill_layer(
     if level.index > 0 {
         let below = neighbours.below.first();
         let floats = |island: &&Island| below.is_none_or(|below| !rests_on(island, below));
-        filled.floating_area = frame.chart.area(&material.filtered(floats));
+        filled.floating =
+            material.filtered(floats).islands().iter().map(|i| frame.floating(i)).collect();
     }
     for (paths, lost) in islands {
         filled.paths.lost.merge(&lost);
@@ -188,6 +198,13 @@ impl<'a> Frame<'a> {
 
     fn fill(&self, line: &FillLine) -> Toolpath {
         self.line(&line.points, line.bead, line.role, line.closed)
+    }
+
+    fn floating(&self, island: &Island) -> Floating {
+        let outline = island.iter().flatten().map(|&p| self.lift.point(&mm(p)));
+        let lowest = outline.min_by(|a, b| a.z.total_cmp(&b.z)).unwrap_or_else(Point3::origin);
+        let area = self.chart.area(&Region::from_island(island.clone()));
+        Floating { at: lowest, area }
     }
 
     /// A region of the chart as it is seen from above.
