@@ -226,6 +226,12 @@ impl Alignment {
         (clearance + worst(self.a, self.a1)).hypot(worst(self.b, self.b1))
     }
 
+    /// Like [`clear_radius`](Self::clear_radius), at one height `z`.
+    #[must_use]
+    pub fn clear_radius_at(&self, clearance: f64, z: f64) -> f64 {
+        (clearance + (self.a + self.a1 * z).abs()).hypot(self.miss(z))
+    }
+
     /// Returns the point of the bed, seen from the axis, on which a point of the part lies.
     #[must_use]
     pub fn over_bed(&self, part: &Point2<f64>) -> Vector2<f64> {

@@ -112,6 +112,7 @@ pub struct Resampler {
     /// From the slicer's frame to the part's.
     azimuth: Rotation2<f64>,
     params: ResampleParams,
+    /// What nozzle and carriage keep from the axis, mm.
     clearance: f64,
     rail: Axis,
     lift: Axis,
@@ -142,17 +143,12 @@ impl Resampler {
     #[must_use]
     pub fn new(printer: &Printer, params: ResampleParams) -> Self {
         let at = printer.alignment.part_from_joints(&printer.home);
-        let clearance = printer.alignment.clear_radius(printer.axis_clearance, printer.lift.max);
-        let chords_keep_clear = match params.dialect.space {
-            Space::IdealPlane => (ARC_CHORD / 2.0).cos(),
-            Space::Joints | Space::Part => 1.0,
-        };
         let reaches_far_side = params.dialect.reaches_far_side();
         Self {
             alignment: printer.alignment,
             azimuth: Rotation2::new(params.azimuth),
             params,
-            clearance: clearance / chords_keep_clear,
+            clearance: printer.axis_clearance,
             rail: printer.rail,
             lift: printer.lift,
             bed_map: printer.bed_map.clone(),
@@ -385,17 +381,18 @@ impl Resampler {
     ) -> Result<(), Unreachable> {
         let tolerance =
             if kind == Kind::Print { self.params.chord } else { self.params.travel_chord };
+        let clearance = self.clear_radius(self.joints.z).max(self.clear_radius(target.z));
         // Most lines are nowhere near.
-        if distance_to_axis(&self.over_bed, &target.over_bed) >= self.clearance {
+        if distance_to_axis(&self.over_bed, &target.over_bed) >= clearance {
             return self.line(kind, target, tolerance, 0, legs);
         }
         let from = Target {
-            over_bed: outside(self.over_bed, target.over_bed, self.clearance),
+            over_bed: outside(self.over_bed, target.over_bed, clearance),
             z: self.joints.z,
         };
-        let goal = outside(target.over_bed, from.over_bed, self.clearance);
-        let way = keep_clear(&from.over_bed, &goal, self.clearance);
-        let lengths = way_lengths(&way, from.over_bed, self.clearance);
+        let goal = outside(target.over_bed, from.over_bed, clearance);
+        let way = keep_clear(&from.over_bed, &goal, clearance);
+        let lengths = way_lengths(&way, from.over_bed, clearance);
         let whole: f64 = lengths.iter().sum();
         for (k, piece) in way.iter().enumerate() {
             // What is left of the way decides, so that the end is exactly at the target.
@@ -412,6 +409,16 @@ impl Resampler {
             }
         }
         Ok(())
+    }
+
+    /// How far from the axis places of the bed must be at a height, so that the nozzle and the carriage
+    /// both keep the printer's clearance.
+    fn clear_radius(&self, z: f64) -> f64 {
+        let chords_keep_clear = match self.params.dialect.space {
+            Space::IdealPlane => (ARC_CHORD / 2.0).cos(),
+            Space::Joints | Space::Part => 1.0,
+        };
+        self.alignment.clear_radius_at(self.clearance, z) / chords_keep_clear
     }
 
     /// A straight piece, halved until its moves are near enough to it.

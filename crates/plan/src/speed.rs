@@ -25,6 +25,8 @@ pub struct Limits {
     least_duration: f64,
     /// Whether rail and bed are driven by this program at all.
     polar: bool,
+    /// Whether the bed's drive takes up its play where the bed turns back, everything else standing.
+    stops_to_turn_back: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,11 +56,13 @@ const SLACK: f64 = 1e-3;
 pub struct Pace {
     speeds: [f64; 2],
     duration: f64,
+    /// The way that the bed turned last: 1 or −1.
+    direction: f64,
 }
 
 impl Pace {
     /// Standing still, for as long as one likes.
-    pub const REST: Self = Self { speeds: [0.0, 0.0], duration: 0.0 };
+    pub const REST: Self = Self { speeds: [0.0, 0.0], duration: 0.0, direction: 1.0 };
 }
 
 impl Limits {
@@ -79,6 +83,7 @@ impl Limits {
             lift_speed: printer.lift.speed * USED_SHARE,
             least_duration: 1.0 / printer.moves_per_second,
             polar: space != Space::Part,
+            stops_to_turn_back: space != Space::Part && printer.alignment.bed.backlash > 0.0,
         }
     }
 }
@@ -117,12 +122,17 @@ pub(crate) fn durations(
 ) -> (Vec<f64>, Pace) {
     let mut durations: Vec<f64> =
         legs.iter().zip(travels).map(|(leg, travel)| at_speed(leg, travel, limits)).collect();
+    let mut direction = before.direction;
+    if limits.stops_to_turn_back {
+        direction = stop_to_turn_back(&mut durations, travels, direction, limits);
+    }
     if limits.polar {
         keep_accelerations(&mut durations, travels, before, limits);
     }
     let last = match (travels.last(), durations.last()) {
         (Some(travel), Some(&duration)) => {
-            Pace { speeds: travel.axes.map(|distance| distance / duration), duration }
+            let speeds = travel.axes.map(|distance| distance / duration);
+            Pace { speeds, duration, direction }
         }
         _ => before,
     };
@@ -139,6 +149,35 @@ fn at_speed(leg: &Leg, travel: &Travel, limits: &Limits) -> f64 {
         }
     }
     duration.max(limits.least_duration)
+}
+
+/// Makes the moves on both sides of a reversal of the bed slow enough to end and to begin at rest, and
+/// returns the direction in the end. Between them the drive takes up its play in a move of its own,
+/// in which nothing else moves.
+fn stop_to_turn_back(
+    durations: &mut [f64],
+    travels: &[Travel],
+    before: f64,
+    limits: &Limits,
+) -> f64 {
+    let mut direction = before;
+    for i in 0..durations.len() {
+        if travels[i].axes[1] * direction >= 0.0 {
+            continue;
+        }
+        direction = -direction;
+        // The last move of a run ends at rest anyhow.
+        for k in i.saturating_sub(1)..=i {
+            durations[k] = durations[k].max(from_rest(&travels[k], limits));
+        }
+    }
+    direction
+}
+
+/// The least duration of a move that begins or ends at rest.
+fn from_rest(travel: &Travel, limits: &Limits) -> f64 {
+    let needed = |k: usize| slowed(travel.axes[k], 0.0, 0.0, limits.axes[k].acceleration);
+    needed(0).max(needed(1))
 }
 
 fn keep_accelerations(durations: &mut [f64], travels: &[Travel], before: Pace, limits: &Limits) {
@@ -218,9 +257,7 @@ fn come_to_rest(durations: &mut [f64], travels: &[Travel], limits: &Limits) -> b
     let (Some(duration), Some(travel)) = (durations.last_mut(), travels.last()) else {
         return false;
     };
-    let needed = (0..2)
-        .map(|k| slowed(travel.axes[k], 0.0, 0.0, limits.axes[k].acceleration))
-        .fold(0.0, f64::max);
+    let needed = from_rest(travel, limits);
     let changed = needed > *duration * (1.0 + SLACK);
     *duration = duration.max(needed);
     changed
@@ -337,6 +374,32 @@ mod tests {
             let (_, travels, durations) = planned(&points, 100.0);
             check(&travels, &durations);
         }
+    }
+
+    #[test]
+    fn a_loose_drive_finds_everything_at_rest_where_the_bed_turns_back() {
+        let zigzag: Vec<[f64; 2]> = (0..40)
+            .map(|i| [30.0 + f64::from(i) * 0.5, f64::from((i + 1) / 2 % 2) * 9.0 - 4.0])
+            .collect();
+        let (legs, travels, _) = planned(&zigzag, 60.0);
+        let mut printer = printer();
+        printer.alignment.bed.backlash = 0.001;
+        let limits = Limits::of(&printer, Space::Joints);
+        let (durations, last) = durations(&legs, &travels, Pace::REST, &limits);
+        check(&travels, &durations);
+        let (mut direction, mut reversals) = (1.0, 0);
+        for i in 0..travels.len() {
+            if travels[i].axes[1] * direction < 0.0 {
+                direction = -direction;
+                reversals += 1;
+                for k in i.saturating_sub(1)..=i {
+                    let speed = travels[k].axes[0].abs() / durations[k];
+                    let reached = printer.rail.acceleration * durations[k] / 2.0;
+                    assert!(speed <= reached, "move {k}: {speed} > {reached}");
+                }
+            }
+        }
+        assert!(reversals > 15 && last.direction == direction);
     }
 
     #[test]

@@ -153,10 +153,24 @@ fn what_lies_over_the_axis_is_printed_in_every_dialect() {
         "core-r-theta",
         "linuxcnc-rotary",
     ];
+    let mut missed = Alignment {
+        a: 0.213,
+        b: 0.347,
+        a1: 0.001,
+        b1: -0.0015,
+        plate_offset: Vector2::new(0.12, -0.05),
+        plate_angle: 0.026,
+        ..Alignment::IDEAL
+    };
+    missed.bed.zero = 0.05;
+    missed.bed.backlash = 0.05_f64.to_radians();
     for printer in printers {
-        let (settings, job) = job(printer, &["fill_density=1"]);
-        for model in &models {
-            program(model, &settings, &job);
+        let (settings, mut job) = job(printer, &["fill_density=1"]);
+        for alignment in [Alignment::IDEAL, missed] {
+            job.printer.alignment = alignment;
+            for model in &models {
+                program(model, &settings, &job);
+            }
         }
     }
 }

@@ -35,7 +35,7 @@ use crate::check::heat::Heat;
 use crate::check::modes::Modes;
 use crate::check::reach::Reach;
 use crate::check::speed::Speed;
-use crate::check::surface::Surface;
+use crate::check::surface::{ROUND_AXIS, Surface};
 use crate::check::text::Text;
 use crate::check::volume::{Enclosed, Volume};
 use crate::family::Family;
@@ -282,6 +282,7 @@ impl<'a> Verifier<'a> {
     }
 
     fn segment(&mut self, segment: &Segment) {
+        let goes_round_axis = self.goes_round_axis(segment);
         let findings = &mut self.findings;
         let doubt = Doubt::of(segment);
         self.tally.segment(segment);
@@ -296,12 +297,20 @@ impl<'a> Verifier<'a> {
         self.surface.segment(segment);
         self.flow.segment(segment, &doubt, findings);
         self.volume.segment(segment);
-        if self.part.is_some() {
+        if self.part.is_some() && !goes_round_axis {
             self.deposit.segment(segment);
         }
         if let Some(watch) = &mut self.watch {
             watch.segment(segment, findings);
         }
+    }
+
+    /// Whether a segment is so near to the axis that its line may lead round it, and not where the part
+    /// is.
+    fn goes_round_axis(&self, segment: &Segment) -> bool {
+        let printer = self.setup.printer;
+        let clear = printer.alignment.clear_radius_at(printer.axis_clearance, segment.part[1].z);
+        segment.nearest < ROUND_AXIS * clear
     }
 
     fn wait(&mut self, heating: Heating) {

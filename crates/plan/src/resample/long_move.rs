@@ -37,10 +37,11 @@ impl Resampler {
         if run < 2 {
             return None;
         }
+        let clearance = self.clear_radius(self.joints.z);
         let target = |stroke: &Stroke| {
             let at = turned(&self.azimuth, &stroke.to);
             let over_bed = Point2::from(self.alignment.over_bed(&at.xy()));
-            let far_enough = over_bed.coords.norm() > self.clearance + LONG_MOVE_CLEARANCE_MM;
+            let far_enough = over_bed.coords.norm() > clearance + LONG_MOVE_CLEARANCE_MM;
             far_enough.then_some(Target { over_bed, z: stroke.to.z })
         };
         // Most strokes end at a corner, which needs no kinematics to be seen.

@@ -15,6 +15,7 @@
 //! Lines that go round the axis are shorter or longer than what they stand for, and are not judged.
 //! mm.
 
+use machine::kinematics::Alignment;
 use machine::profile::Printer;
 use machine::program::Role;
 
@@ -63,6 +64,7 @@ const CLASS: f64 = 0.005;
 /// Compares cross-sections.
 #[derive(Debug)]
 pub(crate) struct Flow {
+    alignment: Alignment,
     filament_area: f64,
     /// mm³/s.
     volume_per_second: f64,
@@ -81,6 +83,7 @@ impl Flow {
     pub(crate) fn new(printer: &Printer, filament_area: f64, volume_per_second: f64) -> Self {
         let round_axis = ROUND_AXIS * printer.axis_clearance;
         Self {
+            alignment: printer.alignment,
             filament_area,
             volume_per_second,
             round_axis,
@@ -116,7 +119,9 @@ impl Flow {
         let is_planar = mark.family.unwrap_or_default() == Family::Planar;
         let [least, most] = match self.ground {
             _ if !is_planar => [THINNEST, THICKEST],
-            Some(ground) => [THINNEST, THICKEST / ground.normal(&segment.middle).z],
+            Some(ground) => {
+                [THINNEST, THICKEST / ground.normal(&segment.middle(&self.alignment)).z]
+            }
             None => [1.0 - DRIFT, 1.0 + DRIFT],
         };
         let volume = announced * segment.path;
