@@ -339,7 +339,7 @@ class View {
   fit() {
     const { box, axis } = this.data;
     const high = box.high[2], away = Math.max(this.reach * 1.1, high * 0.8) / Math.tan(17.5 * Math.PI / 180);
-    const narrow = Math.max(1, 1.15 / this.camera.aspect);
+    const narrow = Math.max(1.1, 1.3 / this.camera.aspect);
     this.controls.target.set((box.low[0] + box.high[0]) / 2 - axis[0], (box.low[1] + box.high[1]) / 2 - axis[1], high * 0.4);
     this.camera.position.set(0.36, -0.74, 0.56).multiplyScalar(away * narrow).add(this.controls.target);
     this.controls.update();
@@ -354,11 +354,13 @@ class View {
     this.controls.update();
   }
 
-  resize(width, height, ratio) {
+  /** Fits the canvas; the middle of the picture is shifted to the left and upwards by some pixels. */
+  resize(width, height, ratio, shift) {
     this.ratio = ratio;
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
+    this.camera.setViewOffset(width, height, shift[0], shift[1], width, height);
     this.camera.updateProjectionMatrix();
   }
 
@@ -377,7 +379,7 @@ class View {
 
   /** Without a graphics card pixels are dear: fewer of them while the picture moves. */
   coarsen(moving) {
-    const ratio = this.ratio * (moving && this.drawer.isSoftware ? 0.6 : 1);
+    const ratio = this.ratio * (moving && this.drawer.isSoftware ? this.sketch.sharpness : 1);
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
   }
 
@@ -492,6 +494,9 @@ function geometryOf(places) {
 /** Roles that are hidden inside as long as the outline is shown. */
 const INSIDE = new Set(['Perimeter', 'Internal infill', 'Solid infill', 'Gap fill']);
 
+/** With fewer runs a sketch shows nothing of the print. */
+const LEAST_RUNS = 10000;
+
 /** When a run of the sketch is shown; 0 is never. */
 const ON_TOP = 1, BY_LAYER = 2, ALWAYS = 3;
 
@@ -503,6 +508,8 @@ class Sketch {
   constructor(view) {
     this.view = view;
     this.budget = view.drawer.isSoftware ? 30000 : 1500000;
+    this.sharpness = 0.6;
+    this.slow = 0;
     this.count = 0;
     this.capacity = 0;
     this.grow = 1;
@@ -663,7 +670,13 @@ class Sketch {
 
   /** Learns from how long a frame took, ms. */
   learn(took) {
-    if (took > 30) this.budget = Math.max(this.budget * 0.85, 12000);
-    else if (took < 20) this.budget = Math.min(this.budget * 1.05, 8e6);
+    if (took > 30) {
+      this.budget = Math.max(this.budget * 0.85, LEAST_RUNS);
+      this.slow += this.budget === LEAST_RUNS ? 1 : 0;
+      if (this.slow === 10) {
+        this.sharpness = Math.max(this.sharpness - 0.1, 0.4);
+        this.slow = 0;
+      }
+    } else if (took < 20) this.budget = Math.min(this.budget * 1.05, 8e6);
   }
 }

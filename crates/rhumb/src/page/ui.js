@@ -12,6 +12,9 @@ function clock(seconds) {
     : s >= 60 ? `${Math.floor(s / 60)}:${two(s % 60)} min` : `${seconds < 10 ? seconds.toFixed(1) : s} s`;
 }
 
+/** With two decimals, and never -0.00. */
+const fixed = (value) => (Math.round(value * 100) / 100 + 0).toFixed(2);
+
 const short = (value) => {
   const size = Math.abs(value);
   return value.toFixed(size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 3);
@@ -110,8 +113,9 @@ class Page {
     const body = table.createTBody();
     const row = (label, sum, into) => {
       const tr = element('tr');
-      const cells = [clock(sum.time).replace(/ (h|min)$/, ''), (100 * sum.time / Math.max(data.time, 1e-9)).toFixed(0), (sum.filament / 1000).toFixed(2),
-        data.meta.density ? this.grams(sum.filament).toFixed(2) : (sum.filament * data.meta.filamentArea / 1000).toFixed(2)];
+      const amount = data.meta.density ? this.grams(sum.filament) : sum.filament * data.meta.filamentArea / 1000;
+      const cells = [clock(sum.time).replace(/ (h|min)$/, ''), (100 * sum.time / Math.max(data.time, 1e-9)).toFixed(0),
+        fixed(sum.filament / 1000), fixed(amount)];
       const name = element('td');
       name.append(label);
       tr.append(name, ...cells.map((text) => element('td', { textContent: text })));
@@ -230,6 +234,7 @@ class Page {
   fold() {
     const isFolded = $('panel').classList.toggle('folded');
     $('fold').setAttribute('aria-expanded', String(!isFolded));
+    this.resize();
   }
 
   setTheme(theme) {
@@ -241,7 +246,10 @@ class Page {
   }
 
   resize() {
-    this.view.resize(innerWidth, innerHeight, Math.min(devicePixelRatio || 1, 2));
+    // Clear of the legend, or of what lies at the foot of a narrow screen.
+    const isFolded = $('panel').classList.contains('folded');
+    const shift = innerWidth <= 720 ? [0, isFolded ? 60 : 160] : [isFolded ? 0 : 160, 16];
+    this.view.resize(innerWidth, innerHeight, Math.min(devicePixelRatio || 1, 2), shift);
     this.sync();
   }
 
