@@ -130,7 +130,7 @@ pub fn slice(
     job.plan.resample.azimuth = placed.azimuth;
     let mut text = Emitter::for_printer(out, job.dialect, &job.printer);
     // On a bed that turns no side is the front: the picture is that of the upright part, too.
-    let thumbnail = Thumbnail::draw(upright.mesh());
+    let thumbnail = Thumbnail::draw(&upright);
     program_text::head(&mut text, request.name, request.made_at, &thumbnail, &job.start)
         .map_err(written)?;
     let mut printed = layers(&upright, &stages, &job, &mut text, watch)?;

@@ -149,7 +149,7 @@ mod tests {
     #[test]
     fn a_name_from_outside_stays_a_comment() {
         let mut out = Emitter::new(Vec::new(), POLAR);
-        let thumbnail = Thumbnail::draw(&mesh::shapes::cube(1.0));
+        let thumbnail = Thumbnail::draw(&mesh::topology::Solid::new(mesh::shapes::cube(1.0)));
         head(&mut out, "cube\nM104 S999\n.stl", "now", &thumbnail, &["G28".into()]).unwrap();
         let text = String::from_utf8(out.finish().unwrap()).unwrap();
         assert!(text.lines().all(|line| !line.starts_with("M104")), "{text}");

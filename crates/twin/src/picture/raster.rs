@@ -52,9 +52,17 @@ impl Raster {
         Self { width, height, near: vec![f32::NEG_INFINITY; count], paint: vec![Self::BARE; count] }
     }
 
-    /// Draws a triangle, whichever side it shows. `paint` is asked only for triangles that cover a
-    /// sample: on fine meshes few do.
-    pub(super) fn triangle(&mut self, corners: [Corner; 3], paint: impl FnOnce() -> u32) {
+    /// Draws a triangle if its corners go counter-clockwise seen from the eye.
+    pub(super) fn front(&mut self, corners: [Corner; 3], paint: impl Fn() -> u32) {
+        let [a, b, c] = corners;
+        if edge(&a, &b, c.x, c.y) < 0 {
+            self.triangle(corners, paint);
+        }
+    }
+
+    /// Draws a triangle, whichever side it shows. `paint` is asked only for triangles that are seen:
+    /// on fine meshes few are.
+    pub(super) fn triangle(&mut self, corners: [Corner; 3], paint: impl Fn() -> u32) {
         let [a, mut b, mut c] = corners;
         let twice_area = edge(&a, &b, c.x, c.y);
         if twice_area == 0 {
@@ -65,7 +73,7 @@ impl Raster {
         }
         let Some([left, right]) = covered([a.x, b.x, c.x], self.width) else { return };
         let Some([top, bottom]) = covered([a.y, b.y, c.y], self.height) else { return };
-        let paint = paint();
+        let mut painted = None;
         let edges = [Edge::new(&b, &c), Edge::new(&c, &a), Edge::new(&a, &b)];
         let scale = 1.0 / twice_area.unsigned_abs() as f32;
         let slope = [(b.near - a.near) * scale, (c.near - a.near) * scale];
@@ -81,7 +89,8 @@ impl Raster {
                         + slope[0] * (inside[1] + edges[1].tie) as f32
                         + slope[1] * (inside[2] + edges[2].tie) as f32;
                     if near > self.near[k] {
-                        (self.near[k], self.paint[k]) = (near, paint);
+                        self.near[k] = near;
+                        self.paint[k] = *painted.get_or_insert_with(&paint);
                     }
                 }
                 for (value, e) in inside.iter_mut().zip(&edges) {
@@ -173,6 +182,15 @@ mod tests {
             assert_eq!((painted(&raster, 2), painted(&raster, 1)), (16, 0));
             assert_eq!(painted(&raster, Raster::BARE), 48);
         }
+    }
+
+    #[test]
+    fn a_front_goes_round_against_the_clock() {
+        let [a, b, c] = [[1.0, 1.0], [1.0, 7.0], [7.0, 7.0]].map(|[x, y]| Corner::new(x, y, 0.0));
+        let mut raster = Raster::new(8, 8);
+        raster.front([a, c, b], || 1);
+        raster.front([a, b, c], || 2);
+        assert_eq!((painted(&raster, 1), painted(&raster, 2)), (0, 15));
     }
 
     #[test]

@@ -6,7 +6,7 @@
 
 use std::io;
 
-use mesh::mesh::Mesh;
+use mesh::topology::Solid;
 use nalgebra::Point3;
 
 use super::camera::{Camera, Gaze};
@@ -38,9 +38,11 @@ pub struct Thumbnail {
 }
 
 impl Thumbnail {
-    /// Draws a part.
+    /// Draws a part. Of one without holes only the outside is looked at.
     #[must_use]
-    pub fn draw(mesh: &Mesh) -> Self {
+    pub fn draw(solid: &Solid) -> Self {
+        let mesh = solid.mesh();
+        let is_closed = solid.open_sides() == 0;
         let camera = Camera::new(&Gaze::default());
         let seen: Vec<[f64; 3]> = mesh.vertices.iter().map(|p| camera.seen(p)).collect();
         let fit = Fit::of(&seen);
@@ -48,11 +50,17 @@ impl Thumbnail {
         let mut raster = Raster::new(SAMPLES, SAMPLES);
         for triangle in &mesh.triangles {
             let [a, b, c] = triangle.map(|v| v as usize);
-            raster.triangle([corners[a], corners[b], corners[c]], || {
+            let paint = || {
                 let [a, b, c]: [&Point3<f64>; 3] = [a, b, c].map(|v| &mesh.vertices[v]);
                 let light = camera.brightness(&(b - a).cross(&(c - a)));
                 (light * f64::from(LIGHTS - 1)).round() as u32
-            });
+            };
+            let corners = [corners[a], corners[b], corners[c]];
+            if is_closed {
+                raster.front(corners, paint);
+            } else {
+                raster.triangle(corners, paint);
+            }
         }
         Self { raster }
     }
@@ -153,6 +161,7 @@ fn palette() -> (Vec<u8>, Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mesh::mesh::Mesh;
     use mesh::shapes;
 
     /// The opacities of a thumbnail's pixels, as a reader of PNG files sees them, and its colours.
@@ -169,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_cube_shows_three_faces_of_different_light() {
-        let bytes = Thumbnail::draw(&shapes::cube(20.0)).png(300).unwrap();
+        let bytes = Thumbnail::draw(&Solid::new(shapes::cube(20.0))).png(300).unwrap();
         assert!(bytes.len() < 8000, "{}", bytes.len());
         let (side, pixels) = decoded(&bytes);
         assert_eq!(side, 300);
@@ -193,7 +202,7 @@ mod tests {
 
     #[test]
     fn small_ones_are_the_same_picture() {
-        let thumbnail = Thumbnail::draw(&shapes::cube(20.0));
+        let thumbnail = Thumbnail::draw(&Solid::new(shapes::cube(20.0)));
         let (side, small) = decoded(&thumbnail.png(32).unwrap());
         assert_eq!(side, 32);
         let (_, large) = decoded(&thumbnail.png(300).unwrap());
@@ -204,8 +213,33 @@ mod tests {
     }
 
     #[test]
+    fn the_near_side_is_seen_and_not_the_far_one() {
+        let closed = Thumbnail::draw(&Solid::new(shapes::cube(20.0))).gathered(300);
+        let mut open = shapes::cube(20.0);
+        // One facet of the underside is never seen.
+        let down = |t: &[u32; 3]| t.iter().all(|v| open.vertices[*v as usize].z < 1.0);
+        let under = open.triangles.iter().position(down).unwrap();
+        open.triangles.remove(under);
+        assert!(closed == Thumbnail::draw(&Solid::new(open)).gathered(300));
+    }
+
+    #[test]
+    fn one_sees_into_an_open_box() {
+        let mut mesh = shapes::cube(20.0);
+        let top = |v: &u32| mesh.vertices[*v as usize].z > 19.0;
+        let sides = mesh.triangles.iter().filter(|t| !t.iter().all(top)).copied().collect();
+        mesh.triangles = sides;
+        let opaque = |mesh: Mesh| {
+            let (_, pixels) = decoded(&Thumbnail::draw(&Solid::new(mesh)).png(300).unwrap());
+            pixels.iter().filter(|p| p[3] == 255).count()
+        };
+        let (open, whole) = (opaque(mesh), opaque(shapes::cube(20.0)));
+        assert!(open.abs_diff(whole) < whole / 100, "{open} {whole}");
+    }
+
+    #[test]
     fn nothing_to_draw_is_an_empty_picture() {
-        let (_, pixels) = decoded(&Thumbnail::draw(&Mesh::default()).png(300).unwrap());
+        let (_, pixels) = decoded(&Thumbnail::draw(&Solid::new(Mesh::default())).png(300).unwrap());
         assert!(pixels.iter().all(|p| p[3] == 0));
     }
 }
