@@ -8,7 +8,7 @@ use machine::kinematics::Unreachable;
 use machine::profile::Printer;
 use machine::program::Move;
 
-use crate::resample::{FlatLegs, ResampleParams, Resampler};
+use crate::resample::{FlatLegs, Leg, ResampleParams, Resampler};
 use crate::route::Stroke;
 use crate::speed::{Limits, Pace, durations, travels};
 use crate::time;
@@ -27,10 +27,24 @@ pub struct Follower {
 /// The moves of consecutive strokes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Followed {
-    /// In order.
-    pub moves: Vec<Move>,
-    /// How many of them each stroke has.
+    legs: Vec<Leg>,
+    /// How long each takes, s.
+    durations: Vec<f64>,
+    /// How many moves each stroke has.
     pub counts: Vec<usize>,
+}
+
+impl Followed {
+    /// Returns the moves in order.
+    pub fn moves(&self) -> impl Iterator<Item = Move> {
+        self.legs.iter().zip(&self.durations).map(|(leg, &duration)| Move {
+            to: leg.to,
+            at: leg.at,
+            filament: leg.filament,
+            path: leg.path,
+            duration,
+        })
+    }
 }
 
 /// A stroke that cannot be followed.
@@ -79,14 +93,7 @@ impl Follower {
         let (times, pace) = durations(&legs, &travels, self.pace, &self.limits);
         self.pace = pace;
         self.time += time::estimate(&legs, &travels, &times, &self.printer, self.space);
-        let moves = legs.iter().zip(times).map(|(leg, duration)| Move {
-            to: leg.to,
-            at: leg.at,
-            filament: leg.filament,
-            path: leg.path,
-            duration,
-        });
-        Ok(Followed { moves: moves.collect(), counts })
+        Ok(Followed { legs, durations: times, counts })
     }
 
     /// Returns the time estimated so far, s.
@@ -119,10 +126,10 @@ mod tests {
         follower.follow(&[travel]).unwrap();
         let strokes: Vec<Stroke> =
             (1..=1000).map(|k| print(f64::from(k) * 1e-4 + f64::from(k / 50), 0.01)).collect();
-        let Followed { moves, counts } = follower.follow(&strokes).unwrap();
-        let fed: f64 = moves.iter().map(|motion| motion.filament).sum();
+        let followed = follower.follow(&strokes).unwrap();
+        let fed: f64 = followed.moves().map(|motion| motion.filament).sum();
         assert!((fed + follower.resampler.owed() - 10.0).abs() < 1e-9, "{fed}");
-        assert!(counts.contains(&0), "some are too short");
+        assert!(followed.counts.contains(&0), "some are too short");
         assert!(follower.time() > 0.4);
     }
 

@@ -6,7 +6,7 @@ use machine::kinematics::{Alignment, Branch};
 use machine::profile::{Axis, Printer, Turntable};
 use machine::program::{BedTurn, Joints, Move};
 use nalgebra::{Point3, Vector2};
-use plan::follow::{Followed, Follower};
+use plan::follow::Follower;
 use plan::resample::{ResampleParams, Resampler};
 use plan::route::{Kind, Stroke};
 use serde_json::Value;
@@ -94,10 +94,9 @@ fn past_the_axis(printer: &Printer, ends: [f64; 2], d: f64, eps: f64) -> Vec<(Jo
     let params = ResampleParams { chord: eps, travel_chord: eps, dialect: POLAR, azimuth: 0.0 };
     let to = Point3::new(d, ends[1], 0.0);
     let stroke = Stroke { kind: Kind::Print, to, filament: 1.0, speed: 60.0, continues: false };
-    let Followed { moves, .. } =
-        Follower::new(printer, params).follow(&[stroke]).expect("within reach");
+    let followed = Follower::new(printer, params).follow(&[stroke]).expect("within reach");
     let mut from = printer.home;
-    moves.into_iter().map(|motion| (std::mem::replace(&mut from, motion.to), motion)).collect()
+    followed.moves().map(|motion| (std::mem::replace(&mut from, motion.to), motion)).collect()
 }
 
 #[test]

@@ -224,19 +224,15 @@ impl<W: Write> Emitter<W> {
 
     /// Appends the speed word, where it is not still the same.
     fn speed(&mut self, motion: &Move, target: [i64; 3], plane_moved: bool) {
-        let known = self.position.filter(|last| last[0] != i64::MIN);
-        let apart = |k: usize| known.map(|last| value(target[k] - last[k], NEAR_AXIS_DECIMALS));
-        let across = match (plane_moved, apart(0), apart(1)) {
-            (true, Some(x), Some(y)) => Some(x.hypot(y)),
-            (true, ..) => None,
-            (false, ..) => Some(0.0),
+        let words = if self.dialect.speed.is_along_words() {
+            self.words_apart(motion, target, plane_moved)
+        } else {
+            0.0
         };
-        let rise = self.position.map_or(0.0, |last| value(target[2] - last[2], MM_DECIMALS));
         let turn = self.turn.map_or(0.0, |last| motion.to.turn.radians() - last.radians());
         let way = Way {
             path: motion.path,
-            // Where nothing is known of the begin the planned path is the best guess.
-            words: across.map_or(motion.path, |across| across.hypot(rise)),
+            words,
             filament: motion.filament,
             turn: if plane_moved { turn } else { 0.0 },
             radius: motion.to.s.abs(),
@@ -257,6 +253,20 @@ impl<W: Write> Emitter<W> {
             push_quantum(&mut self.line, feed, decimals);
             self.feed = feed;
         }
+    }
+
+    /// How far the words of a move are from those before, mm.
+    fn words_apart(&self, motion: &Move, target: [i64; 3], plane_moved: bool) -> f64 {
+        let known = self.position.filter(|last| last[0] != i64::MIN);
+        let apart = |k: usize| known.map(|last| value(target[k] - last[k], NEAR_AXIS_DECIMALS));
+        let across = match (plane_moved, apart(0), apart(1)) {
+            (true, Some(x), Some(y)) => Some(x.hypot(y)),
+            (true, ..) => None,
+            (false, ..) => Some(0.0),
+        };
+        let rise = self.position.map_or(0.0, |last| value(target[2] - last[2], MM_DECIMALS));
+        // Where nothing is known of the begin the planned path is the best guess.
+        across.map_or(motion.path, |across| across.hypot(rise))
     }
 
     /// Sets the count of the bed back by whole turns where it has grown too large for the firmware;

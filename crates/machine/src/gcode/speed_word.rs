@@ -67,6 +67,12 @@ impl SpeedWord {
         }
     }
 
+    /// Returns whether the distance in the words counts.
+    #[must_use]
+    pub fn is_along_words(&self) -> bool {
+        matches!(self, Self::Words | Self::MarlinPolar { .. })
+    }
+
     /// Returns whether every move needs the word anew.
     #[must_use]
     pub fn is_of_one_move(&self) -> bool {

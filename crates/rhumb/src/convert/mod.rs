@@ -215,10 +215,10 @@ impl<'a> Writing<'a> {
     }
 
     fn batch(&mut self, planned: Planned) -> Result<(), Failure> {
-        let Planned { batch, followed: Followed { moves, counts }, time } = planned;
+        let Planned { batch, followed, time } = planned;
         let mut others = batch.between.into_iter().peekable();
-        let mut moves = moves.into_iter();
-        for (index, count) in counts.into_iter().enumerate() {
+        let mut moves = followed.moves();
+        for (index, &count) in followed.counts.iter().enumerate() {
             while let Some((_, other)) = others.next_if(|(before, _)| *before <= index) {
                 self.other(other)?;
             }
