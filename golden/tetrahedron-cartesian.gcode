@@ -654,7 +654,7 @@ M104 S0
 M140 S0
 M107
 M84
-; estimated printing time (normal mode) = 39s
+; estimated printing time (normal mode) = 22s
 ; filament used [mm] = 5.09
 ; filament used [cm3] = 0.01
 ; filament used [g] = 0.02
