@@ -19,6 +19,7 @@ mod mutants;
 mod names;
 mod preview;
 mod program;
+mod relief;
 mod rotation;
 mod roundtrip;
 mod run;

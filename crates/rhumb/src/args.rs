@@ -479,6 +479,10 @@ pub struct Preview {
     /// What the colours of the whole print mean (png, svg)
     #[arg(long, value_enum, default_value_t = Coloring::Role)]
     pub color_by: Coloring,
+    /// What of the deposit to show: as it would stand there, its height map from straight above, or a
+    /// section upright through the rotation axis at --azimuth (png)
+    #[arg(long, value_enum, default_value_t = DepositView::Solid)]
+    pub view: DepositView,
     /// Azimuth of the eye about the part, degrees from x towards y (png)
     #[arg(long, value_name = "DEG", default_value_t = -60.0, allow_hyphen_values = true)]
     pub azimuth: f64,
@@ -549,6 +553,15 @@ pub enum ServerKind {
     Moonraker,
     /// `OctoPrint`.
     Octoprint,
+/// How a deposit is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum DepositView {
+    /// As it would stand there.
+    Solid,
+    /// From straight above, coloured by height.
+    Height,
+    /// Cut upright through the rotation axis.
+    Section,
 }
 
 /// What is plotted.

@@ -7,12 +7,13 @@ use twin::picture::deposit::{self, DepositSink, Picture, deposit_png};
 use twin::picture::layer::{LayerSink, layer_svg};
 use twin::picture::plot::{Flat, MotionSink, motion_svg, schedule_svg};
 use twin::picture::print::{PrintSink, Shade, print_svg};
+use twin::picture::relief::{height_png, section_png};
 use twin::segment::Segment;
 use twin::verify::Verdict;
 
 use super::verify::{job_of, names_itself, part};
 use super::{DONE, display_name, write_file};
-use crate::args::{Coloring, Plot, Preview};
+use crate::args::{Coloring, DepositView, Plot, Preview};
 use crate::check::{check, findings};
 use crate::convert::{middle, segments};
 use crate::failure::Failure;
@@ -36,6 +37,7 @@ pub(super) fn run(arguments: &Preview) -> Result<u8, Failure> {
     let misfit = match (arguments.layer, arguments.plot) {
         (Some(_), _) => only("--layer", "svg"),
         (_, Some(_)) => only("--plot", "svg"),
+        _ if arguments.view != DepositView::Solid => only("--view", "png"),
         _ => None,
     };
     if let Some(failure) = misfit {
@@ -164,6 +166,18 @@ impl<'a> Program<'a> {
         };
         let mut sink = DepositSink::new(&self.job.printer, self.job.plan.filament.area);
         self.replay(|segment| sink.add(segment))?;
+        let relief = match self.arguments.view {
+            DepositView::Solid => None,
+            DepositView::Height => Some(height_png(&sink, [width, height])),
+            DepositView::Section => {
+                Some(section_png(&sink, gaze.azimuth, self.shade(), [width, height]))
+            }
+        };
+        if let Some(relief) = relief {
+            return relief
+                .map(|relief| relief.png)
+                .map_err(|error| Failure::new("Bug", format!("picture: {error}")));
+        }
         deposit_png(&sink, &Picture { width, height, gaze, shade: self.shade() })
             .map_err(|error| Failure::new("Bug", format!("picture: {error}")))
     }

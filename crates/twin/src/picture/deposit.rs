@@ -41,13 +41,13 @@ pub struct DepositSink {
 
 /// A straight piece of material. mm; single precision is ample for pixels.
 #[derive(Debug, Clone, Copy)]
-struct Bead {
+pub(super) struct Bead {
     /// The nozzle's way, on the bead's top.
-    from: [f32; 3],
-    to: [f32; 3],
-    width: f32,
-    thickness: f32,
-    role: Role,
+    pub(super) from: [f32; 3],
+    pub(super) to: [f32; 3],
+    pub(super) width: f32,
+    pub(super) thickness: f32,
+    pub(super) role: Role,
 }
 
 impl DepositSink {
@@ -55,6 +55,16 @@ impl DepositSink {
     #[must_use]
     pub fn new(printer: &Printer, filament_area: f64) -> Self {
         Self { alignment: printer.alignment, filament_area, beads: Vec::new() }
+    }
+
+    /// The beads, in the order in which they were laid.
+    pub(super) fn beads(&self) -> &[Bead] {
+        &self.beads
+    }
+
+    /// Where the rotation axis passes through the part.
+    pub(super) fn axis(&self) -> Point2<f64> {
+        self.alignment.part_from_bed(&Vector2::zeros())
     }
 
     /// Takes note of a segment.
@@ -106,7 +116,7 @@ pub struct Picture {
 pub fn deposit_png(sink: &DepositSink, picture: &Picture) -> io::Result<Vec<u8>> {
     let size = [picture.width, picture.height].map(|side| side.clamp(1, LARGEST));
     let camera = Camera::new(&picture.gaze);
-    let axis = sink.alignment.part_from_bed(&Vector2::zeros());
+    let axis = sink.axis();
     let view = View::around(&sink.beads, &axis, &camera, size);
     let mut raster = Raster::new(size[0] * FINE, size[1] * FINE);
     bed(&mut raster, &view, &axis);
@@ -131,7 +141,7 @@ struct View<'a> {
     bed: f64,
 }
 
-fn double(p: [f32; 3]) -> Point3<f64> {
+pub(super) fn double(p: [f32; 3]) -> Point3<f64> {
     Point3::from(p.map(f64::from))
 }
 

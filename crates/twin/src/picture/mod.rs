@@ -1,7 +1,7 @@
 //! Pictures of what was replayed, as SVG text or PNG files.
 //!
 //! Segments are collected by a sink ([`layer::LayerSink`], [`print::PrintSink`],
-//! [`deposit::DepositSink`], [`plot::MotionSink`]) and drawn by a function of the same module. Nothing
+//! [`deposit::DepositSink`] (which [`relief`] draws too), [`plot::MotionSink`]) and drawn by a function of the same module. Nothing
 //! but replayed segments is drawn, so a picture cannot show what the machine would not do; only
 //! [`thumbnail`]s, which stand at the head of a program, are drawn from the mesh. Colours of lines and
 //! text are of middle lightness: pictures have no background of their own and are legible on
@@ -19,6 +19,7 @@ mod palette;
 pub mod plot;
 pub mod print;
 mod raster;
+pub mod relief;
 pub mod step_map;
 mod svg;
 pub mod thumbnail;
