@@ -39,6 +39,8 @@ struct Manner {
     is_ready: bool,
     /// Answers an upload before it has read it, and closes.
     is_hasty: bool,
+    /// Knows nothing but uploads.
+    is_silent: bool,
 }
 
 impl Server {
@@ -98,6 +100,7 @@ fn serve(stream: &TcpStream, manner: Manner, seen: &Mutex<Seen>) {
     let mut body = vec![0; header("Content-Length").map_or(0, |n| n.parse().unwrap())];
     from.read_exact(&mut body).unwrap();
     let (status, said) = match (asked.as_str(), manner.is_octoprint) {
+        _ if manner.is_silent && !asked.starts_with("POST ") => (404, String::new()),
         _ if !knows_key && manner.is_octoprint => (403, r#"{"error": "no permission"}"#.to_owned()),
         _ if !knows_key => (401, r#"{"error": {"code": 401, "message": "Unauthorized"}}"#.into()),
         ("GET /server/info", false) => (200, r#"{"result": {"klippy_state": "ready"}}"#.into()),
@@ -203,6 +206,7 @@ const MOONRAKER: Manner = Manner {
     has: "",
     is_ready: true,
     is_hasty: false,
+    is_silent: false,
 };
 const OCTOPRINT: Manner = Manner { is_octoprint: true, wants_key: true, ..MOONRAKER };
 
@@ -220,6 +224,16 @@ fn moonraker_gets_the_very_bytes_and_prints_them_when_told() {
     let said: Value = serde_json::from_str(&ran.out).unwrap();
     assert_eq!((&said["started"], &said["server"]), (&true.into(), &"moonraker".into()));
     assert_eq!(said["bytes"], program().len());
+}
+
+#[test]
+fn servers_that_do_not_say_what_they_are_get_it_too() {
+    for manner in [MOONRAKER, OCTOPRINT] {
+        let (scratch, server) = (scratch(), Server::start(Manner { is_silent: true, ..manner }));
+        send(&scratch, &server, &["--api-key", KEY, "--start"]).expect(0);
+        assert_eq!(server.file(), Some(("part.gcode".to_owned(), program())));
+        assert_eq!(server.field("select").is_some(), manner.is_octoprint);
+    }
 }
 
 #[test]

@@ -246,6 +246,18 @@ const tower = foreign();
   await tab.$$eval('#findings button', (buttons) => buttons.find((button) => button.textContent.startsWith('reach')).click());
   const line = await tab.evaluate('rhumb.data.line[rhumb.page.state.move]');
   assert.equal(line, at + 1, 'the mark leads to the line');
+  // So does the mark in the picture.
+  await tab.evaluate('rhumb.page.setLayer(rhumb.data.layers.length - 1), rhumb.page.fit()');
+  await still(tab);
+  const [x, y] = await tab.evaluate(() => {
+    const { view, data } = { view: rhumb.page.view, data: rhumb.data };
+    const k = data.meta.findings.findIndex((finding) => finding.check === 'reach');
+    const place = new THREE.Vector3(...view.stand(data.meta.findings[k].move, 0).place).applyMatrix4(view.part.matrixWorld).project(view.camera);
+    return [(place.x + 1) / 2 * innerWidth, (1 - place.y) / 2 * innerHeight];
+  });
+  await tab.mouse.click(x, y);
+  const reached = await tab.evaluate('rhumb.data.line[rhumb.page.state.move]');
+  assert(Math.abs(reached - (at + 1)) <= 1, `the mark in the picture leads to line ${reached}, not ${at + 1}`);
   assert.deepEqual(complaints, []);
   await tab.close();
 }

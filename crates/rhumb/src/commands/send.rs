@@ -11,7 +11,8 @@ mod servers;
 mod upload;
 
 use std::fs::File;
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Seek};
+use std::path::Path;
 
 use super::{DONE, LOOK, display_name, say, say_json};
 use crate::args::{IfExists, Manner, Send};
@@ -33,7 +34,7 @@ pub(super) fn run(arguments: &Send, manner: &Manner) -> Result<u8, Failure> {
         None => display_name(&arguments.program),
     };
     check_name(&wanted)?;
-    let target = PrintServer::find(&server, &key, arguments.server)?;
+    let mut target = PrintServer::find(&server, &key, arguments.server)?;
     let mut name = wanted.clone();
     let mut replaces = false;
     if target.has(&name)? {
@@ -52,8 +53,15 @@ pub(super) fn run(arguments: &Send, manner: &Manner) -> Result<u8, Failure> {
     } else {
         Box::new(Bars::default())
     };
-    let mut upload = Upload::new(file, length, &name, &target.fields(arguments.start));
-    let started = upload.send(&target, &mut *progress, &interrupt)?;
+    let started = loop {
+        let again = file.try_clone().and_then(|mut file| file.rewind().map(|()| file));
+        let file = again.map_err(|error| unreadable(&arguments.program, &error))?;
+        let mut upload = Upload::new(file, length, &name, &target.fields(arguments.start));
+        match (upload.send(&target, &mut *progress, &interrupt)?, target.other()) {
+            (None, Some(other)) => target = other,
+            (started, _) => break started == Some(true),
+        }
+    };
     drop(progress);
     let started = arguments.start.then_some(started);
     tell(&Sent { name, length, replaces, started, target: &target }, manner)
@@ -71,14 +79,7 @@ fn address(error: AddressError) -> Failure {
 
 fn open(arguments: &Send) -> Result<(File, u64), Failure> {
     let path = &arguments.program;
-    let failed = |error: std::io::Error| {
-        let class = match error.kind() {
-            std::io::ErrorKind::NotFound => "NotFound",
-            std::io::ErrorKind::PermissionDenied => "PermissionDenied",
-            _ => "Unreadable",
-        };
-        Failure::new(class, format!("{}: {error}", path.display()))
-    };
+    let failed = |error: std::io::Error| unreadable(path, &error);
     let metadata = std::fs::metadata(path).map_err(failed)?;
     if metadata.is_dir() {
         return Err(Failure::new("IsDirectory", path.display().to_string()));
@@ -90,6 +91,15 @@ fn open(arguments: &Send) -> Result<(File, u64), Failure> {
         return Err(Failure::new("EmptyFile", format!("{} is empty", path.display())));
     }
     Ok((File::open(path).map_err(failed)?, metadata.len()))
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
+    let class = match error.kind() {
+        std::io::ErrorKind::NotFound => "NotFound",
+        std::io::ErrorKind::PermissionDenied => "PermissionDenied",
+        _ => "Unreadable",
+    };
+    Failure::new(class, format!("{}: {error}", path.display()))
 }
 
 /// Servers take names with `.gcode` only, and a slash would be a folder.

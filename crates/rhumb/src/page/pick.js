@@ -34,6 +34,19 @@ function moveAt(view, state, x, y, width, height) {
   return best < 0 ? -1 : data.moveOf[best];
 }
 
+/** The finding whose mark is under a place of the screen (pixels), if any. */
+function findingAt(view, x, y, width, height) {
+  const place = new THREE.Vector3();
+  const { moves } = view.findings;
+  let best, nearest = 12;
+  moves.forEach((move, k) => {
+    place.set(...view.stand(move, 0).place).applyMatrix4(view.part.matrixWorld).project(view.camera);
+    const off = Math.hypot((place.x + 1) / 2 * width - x, (1 - place.y) / 2 * height - y);
+    if (place.z < 1 && off < nearest) { nearest = off; best = view.data.meta.findings[k]; }
+  });
+  return best;
+}
+
 /** Whether the box of a chunk, as the screen sees it, has the place inside. */
 function boxMeets(chunk, project, x, y) {
   const out = [0, 0, 0];

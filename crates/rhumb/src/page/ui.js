@@ -345,10 +345,13 @@ class Page {
     canvas.addEventListener('pointerdown', () => { tip.hidden = true; canvas.focus({ preventScroll: true }); });
     const look = (event) => {
       asked = false;
-      const move = moveAt(this.view, this.state, event.clientX, event.clientY, innerWidth, innerHeight);
+      const place = [event.clientX, event.clientY, innerWidth, innerHeight];
+      const finding = findingAt(this.view, ...place);
+      const move = finding ? finding.move : moveAt(this.view, this.state, ...place);
       tip.hidden = move < 0;
       if (move < 0) return;
-      tip.textContent = this.describe(move);
+      tip.textContent = finding ? `${finding.check}: ${finding.message}` : this.describe(move);
+      if (finding && event.type === 'click') this.jump(finding.move);
       const left = Math.min(event.clientX + 16, innerWidth - tip.offsetWidth - 8);
       const top = Math.min(event.clientY + 16, innerHeight - tip.offsetHeight - 8);
       tip.style.left = `${left}px`;

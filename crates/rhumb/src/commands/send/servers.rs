@@ -14,10 +14,13 @@ pub(super) struct PrintServer<'a> {
     server: &'a Server,
     key: &'a Option<Key>,
     kind: ServerKind,
+    /// Whether it said what it is, or the user did.
+    is_known: bool,
 }
 
 impl<'a> PrintServer<'a> {
-    /// Asks which of the two stands there, and whether it takes the key.
+    /// Asks which of the two stands there, and whether it takes the key. One that answers and does
+    /// not say is taken for Moonraker until it knows no upload of that kind.
     pub(super) fn find(
         server: &'a Server,
         key: &'a Option<Key>,
@@ -26,7 +29,7 @@ impl<'a> PrintServer<'a> {
         let kinds =
             told.map_or(vec![ServerKind::Moonraker, ServerKind::Octoprint], |kind| vec![kind]);
         for kind in kinds {
-            let found = Self { server, key, kind };
+            let found = Self { server, key, kind, is_known: true };
             let answer = found.get(match kind {
                 ServerKind::Moonraker => "/server/info",
                 ServerKind::Octoprint => "/api/version",
@@ -38,11 +41,19 @@ impl<'a> PrintServer<'a> {
                 _ => {}
             }
         }
-        let message = format!("neither Moonraker nor OctoPrint answers at {}", server.authority());
-        Err(Failure::new("PrinterRefused", message).hint(
-            "check the port (Moonraker 7125, OctoPrint 5000 or 80), or say --server \
-             moonraker or octoprint",
-        ))
+        Ok(Self { server, key, kind: ServerKind::Moonraker, is_known: false })
+    }
+
+    fn unknown(&self) -> Failure {
+        let message = format!("neither Moonraker nor OctoPrint answers at {}", self.host());
+        Failure::new("PrinterRefused", message)
+            .hint("check the port: Moonraker has 7125, OctoPrint 5000 or 80")
+    }
+
+    /// Returns the other kind to try, when an upload found nobody who knows it.
+    pub(super) fn other(&self) -> Option<Self> {
+        let is_guess = !self.is_known && self.kind == ServerKind::Moonraker;
+        is_guess.then_some(Self { kind: ServerKind::Octoprint, ..*self })
     }
 
     pub(super) fn kind_name(&self) -> &'static str {
@@ -113,14 +124,18 @@ impl<'a> PrintServer<'a> {
         fields
     }
 
-    /// Sends a form, and returns whether the print was begun.
-    pub(super) fn upload(&self, body: Body<'_>) -> Result<bool, Failure> {
+    /// Sends a form, and returns whether the print was begun; `None` when the server, which was
+    /// only guessed, knows no such upload.
+    pub(super) fn upload(&self, body: Body<'_>) -> Result<Option<bool>, Failure> {
         let length = body.length;
         let path = match self.kind {
             ServerKind::Moonraker => "/server/files/upload",
             ServerKind::Octoprint => "/api/files/local",
         };
         let answer = self.ask("POST", path, Some(body))?;
+        if !self.is_known && matches!(answer.status, 404 | 405 | 501) {
+            return if self.other().is_some() { Ok(None) } else { Err(self.unknown()) };
+        }
         if !(200..300).contains(&answer.status) {
             return Err(self.refused(&answer));
         }
@@ -133,10 +148,10 @@ impl<'a> PrintServer<'a> {
                 "the server stored another file than was sent",
             ));
         }
-        Ok(match self.kind {
+        Ok(Some(match self.kind {
             ServerKind::Moonraker => said["print_started"] == true || said["print_queued"] == true,
             ServerKind::Octoprint => said["effectivePrint"] == true,
-        })
+        }))
     }
 
     fn get(&self, path: &str) -> Result<Answer, Failure> {

@@ -42,13 +42,14 @@ impl Upload {
         Self { head: head.into_bytes(), file, length, tail: tail.into_bytes() }
     }
 
-    /// Sends it; returns whether the print was begun.
+    /// Sends it; returns whether the print was begun, and `None` when the server does not know
+    /// what to do with it.
     pub(super) fn send(
         &mut self,
         target: &PrintServer<'_>,
         progress: &mut dyn Progress,
         interrupt: &Interrupt,
-    ) -> Result<bool, Failure> {
+    ) -> Result<Option<bool>, Failure> {
         progress.stage("send", self.length.div_ceil(STEP));
         let length = self.head.len() as u64 + self.length + self.tail.len() as u64;
         let mut watched = Watched { from: &mut self.file, read: 0, progress, interrupt };
