@@ -52,6 +52,9 @@ const RIM_STEP_MM: [f64; 2] = [0.12, 0.3];
 /// How much an axis may be simplified, mm, in place and in half its width alike.
 const AXIS_TOLERANCE_MM: f64 = 0.01;
 
+/// The same on curved layers, where beads taper at every shallow face that a layer meets.
+const CURVED_AXIS_TOLERANCE_MM: f64 = 0.004;
+
 /// A branch shorter than this many widths of the place at its hub leads into a corner: half a width
 /// is what the hub's own disc covers, and the bead that ends at the hub covers as much again.
 const SHORT_BRANCH_IN_WIDTHS: f64 = 1.5;
@@ -96,12 +99,13 @@ fn axes_of_island(
     let Ok(triangles) = triangulate(&rings) else { return Vec::new() };
     let rim = Rim::new(&rings);
     let points: Vec<Point2<f64>> = rings.into_iter().flatten().collect();
+    let tolerance = if chart.is_flat() { AXIS_TOLERANCE_MM } else { CURVED_AXIS_TOLERANCE_MM };
     let graph = AxisGraph::new(&triangles, &points, &rim, chart);
     graph
         .branches()
         .into_iter()
         .flat_map(|branch| printable_pieces(&branch, least, greatest))
-        .map(|piece| simplified(&piece))
+        .map(|piece| simplified(&piece, tolerance))
         .filter(|piece| {
             let length: f64 = piece.windows(2).map(|w| distance(&w[0].at, &w[1].at)).sum();
             length >= LEAST_LENGTH_IN_WIDTHS * piece[0].width
@@ -284,7 +288,7 @@ fn printable_pieces(line: &[AxisPoint], least: f64, greatest: f64) -> Vec<Vec<Ax
         .collect()
 }
 
-fn simplified(line: &[AxisPoint]) -> Vec<AxisPoint> {
+fn simplified(line: &[AxisPoint], tolerance: f64) -> Vec<AxisPoint> {
     let mut keep = vec![false; line.len()];
     keep[0] = true;
     keep[line.len() - 1] = true;
@@ -295,7 +299,7 @@ fn simplified(line: &[AxisPoint]) -> Vec<AxisPoint> {
         let half_width = (a.width + (b.width - a.width) * share - p.width) / 2.0;
         (p.at - at).norm_squared() + half_width * half_width
     };
-    mark_kept(0, line.len() - 1, AXIS_TOLERANCE_MM * AXIS_TOLERANCE_MM, off, &mut keep);
+    mark_kept(0, line.len() - 1, tolerance * tolerance, off, &mut keep);
     line.iter().zip(keep).filter(|(_, keep)| *keep).map(|(p, _)| *p).collect()
 }
 

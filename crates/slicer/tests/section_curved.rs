@@ -134,6 +134,64 @@ fn outlines_close_and_layers_add_up_to_the_volume() {
     }
 }
 
+/// The real models beside the repository that are closed as they come; none in a plain clone.
+fn real_models() -> Vec<(String, Solid)> {
+    let manifest = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let Some(folder) = manifest.ancestors().nth(3).map(|dir| dir.join("shared/models/real")) else {
+        return Vec::new();
+    };
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let mut paths: Vec<_> = entries.map(|entry| entry.expect("a readable folder").path()).collect();
+    paths.sort();
+    let read = |path: &std::path::PathBuf| {
+        let bytes = std::fs::read(path).expect("a readable model");
+        // Larger ones take minutes without optimization and show nothing else.
+        const MOST_BYTES: usize = 3_000_000;
+        if path.extension()? != "stl" || bytes.len() > MOST_BYTES {
+            return None;
+        }
+        let soup = mesh::stl::read(&bytes).ok()?.0;
+        let (solid, health) = mesh::health::solid_from_soup(&soup).ok()?;
+        let lowest = solid.mesh().bounds().min;
+        let centre = nalgebra::center(&lowest, &solid.mesh().bounds().max);
+        let shift = Vector3::new(-centre.x, -centre.y, 0.1 - lowest.z);
+        // The volume of shells that overlap counts twice what a section has once.
+        let is_closed = health.repairs().next().is_none()
+            && health.nonmanifold_edges == 0
+            && health.shells == 1;
+        let name = path.file_name()?.to_string_lossy().into_owned();
+        is_closed.then(|| (name, solid.moved(|p| p + shift)))
+    };
+    paths.iter().filter_map(read).collect()
+}
+
+#[test]
+fn real_models_close_and_add_up_too() {
+    for (k, (name, solid)) in real_models().iter().enumerate() {
+        let volume = volume_mm3(solid.mesh());
+        // Cones both ways and spheres; each model meets other ones.
+        let surfaces = surfaces();
+        let chosen = [k % 3, 3 + k % 4, 7 + k % 3];
+        for (surface_name, surface) in chosen.map(|i| &surfaces[i]) {
+            let range = level_range(solid, surface.as_ref()).unwrap();
+            let levels = gauss_levels(range, 120);
+            let cuts = levels.iter().map(|(level, _)| *level).collect();
+            let cutter = Cutter::at_levels(solid, surface.as_ref(), cuts);
+            let areas: Vec<f64> = (0..levels.len())
+                .into_par_iter()
+                .map(|k| {
+                    let section = cutter.section(k, 1e-3);
+                    assert_eq!(section.tears, Tears::default(), "{name}, {surface_name}");
+                    surface.chart(levels[k].0).area(&section.region)
+                })
+                .collect();
+            let sum: f64 = areas.iter().zip(&levels).map(|(area, (_, weight))| area * weight).sum();
+            let error = sum / surface.level_step(1.0) / volume - 1.0;
+            assert!(error.abs() < 1e-4, "{name}, {surface_name}: {error:e}");
+        }
+    }
+}
+
 fn section(solid: &Solid, surface: &dyn LayerSurface, level: f64) -> Region {
     let cutter = Cutter::at_levels(solid, surface, vec![level]);
     let section = cutter.section(0, 0.001);
