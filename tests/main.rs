@@ -8,6 +8,7 @@
 
 mod bundled;
 mod cli;
+mod comparison;
 mod corpus;
 mod curved;
 mod golden;
