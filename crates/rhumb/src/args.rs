@@ -553,6 +553,8 @@ pub enum ServerKind {
     Moonraker,
     /// `OctoPrint`.
     Octoprint,
+}
+
 /// How a deposit is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum DepositView {
