@@ -206,8 +206,8 @@ mod tests {
                 assert!(surface.height(level + step, r) > stair.ceiling());
             }
         }
-        let low =
-            Stair { surface: &cone, level: 0.6, step: 0.23, floor: 0.4, top: 0.7, least: 0.1 };
+        // The highest layer below the ceiling would lie 0.23 mm high, under the floor.
+        let low = Stair { surface: &cone, level: 0.6, step: 0.5, floor: 0.4, top: 0.7, least: 0.1 };
         assert!((low.thickness(8.0) - 0.3).abs() < 1e-12, "there is nothing below the floor");
     }
 }

@@ -67,7 +67,10 @@ impl Resampler {
         let leg = legs.pop()?;
         let filament = strokes[..good].iter().map(|stroke| stroke.filament).sum();
         let filament = self.with_owed(Kind::Print, filament, true);
-        Some((good, Leg { filament, speed: strokes[0].speed, ..leg }))
+        // No stroke may be passed faster than its own flow allows.
+        let speeds = strokes[..good].iter().map(|stroke| stroke.speed);
+        let speed = speeds.fold(f64::INFINITY, f64::min);
+        Some((good, Leg { filament, speed, ..leg }))
     }
 
     /// Whether a move past the first of two targets could end at the second: how far the first lies
