@@ -106,25 +106,54 @@ fn outermost<I: Iterator<Item = Point3<f64>>>(points: impl Fn() -> I) -> Vec<Poi
     if left.len() <= FEW { left } else { far_in_sectors(left, &centre) }
 }
 
+/// A point this far from a side, mm, is on that side of it: far above rounding, and a point left in
+/// only takes time.
+const SURELY: f64 = 1e-6;
+
 /// A hull of so many points takes no time to speak of.
 const FEW: usize = 4096;
 
-/// A round part has much of its surface near its outline: points that are surely inside what lies
-/// farthest from the centre in each of many sectors are left out too.
+/// A round part has much of its surface near its outline, and a long one much of it outside the
+/// circle: points that are inside the polygon of what lies farthest from the centre in each of many
+/// sectors are left out too.
 fn far_in_sectors(points: Vec<Point2<f64>>, centre: &Point2<f64>) -> Vec<Point2<f64>> {
     const N_SECTORS: usize = 512;
     let mut far: Vec<Option<(f64, Point2<f64>)>> = vec![None; N_SECTORS];
+    let sector = |p: &Point2<f64>| {
+        let share = quarters(&(p - centre)) / 4.0;
+        ((share * N_SECTORS as f64) as usize).min(N_SECTORS - 1)
+    };
     for p in &points {
-        let arm = p - centre;
-        let turn = (arm.y.atan2(arm.x) / TAU).rem_euclid(1.0);
-        let slot = &mut far[((turn * N_SECTORS as f64) as usize).min(N_SECTORS - 1)];
-        if slot.is_none_or(|(most, _)| arm.norm_squared() > most) {
-            *slot = Some((arm.norm_squared(), *p));
+        let apart = nalgebra::distance_squared(p, centre);
+        let slot = &mut far[sector(p)];
+        if slot.is_none_or(|(most, _)| apart > most) {
+            *slot = Some((apart, *p));
         }
     }
-    let corners: Vec<Point2<f64>> = far.into_iter().flatten().map(|(_, p)| p).collect();
-    let inside = inscribed(&corners, centre);
-    points.into_iter().filter(|p| nalgebra::distance(p, centre) >= inside).collect()
+    let corner = |i: usize| far[i % N_SECTORS].map(|(_, p)| p);
+    // What lies farthest in the sector before, in a sector, and in the one after.
+    let corners: Vec<Option<[Point2<f64>; 3]>> = (0..N_SECTORS)
+        .map(|i| Some([corner(i + N_SECTORS - 1)?, corner(i)?, corner(i + 1)?]))
+        .collect();
+    let left_of = |p: &Point2<f64>, a: &Point2<f64>, b: &Point2<f64>| {
+        (b - a).perp(&(p - a)) > SURELY * nalgebra::distance(a, b)
+    };
+    // On the inner side of both sides that meet in the sector.
+    let is_inside = |p: &Point2<f64>| {
+        corners[sector(p)].is_some_and(|[a, b, c]| left_of(p, &a, &b) && left_of(p, &b, &c))
+    };
+    points.into_iter().filter(|p| !is_inside(p)).collect()
+}
+
+/// The direction of an arm as a number from 0 to 4 that grows with its angle, a quarter of a turn
+/// for each.
+fn quarters(arm: &Vector2<f64>) -> f64 {
+    let sum = arm.x.abs() + arm.y.abs();
+    if sum == 0.0 {
+        return 0.0;
+    }
+    let along = arm.x / sum;
+    if arm.y >= 0.0 { 1.0 - along } else { 3.0 + along }
 }
 
 /// The radius of a circle about a centre that is inside a polygon; not above 0 when the centre is
@@ -181,5 +210,16 @@ mod tests {
         }
         assert!(outermost(|| shapes::icosphere(4, 10.0).vertices.into_iter()).len() < 1000);
         assert_eq!(footprint(&Mesh::default()), None);
+    }
+
+    #[test]
+    fn of_a_long_part_little_is_left() {
+        let mut egg = shapes::icosphere(6, 10.0);
+        egg.vertices.iter_mut().for_each(|p| p.x = 1.4 * p.x + 0.1 * p.y);
+        let all: Vec<Point2<f64>> = egg.vertices.iter().map(|p| p.xy()).collect();
+        assert_eq!(smallest_around(&all), footprint(&egg));
+        // Two fifths of them are outside the circle that the egg holds.
+        let left = outermost(|| egg.vertices.iter().copied()).len();
+        assert!(left < all.len() / 5, "{left} of {}", all.len());
     }
 }

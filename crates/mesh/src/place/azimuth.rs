@@ -16,12 +16,16 @@
 //! those weighted by height, so that a part that looks the same from above after half a turn, but
 //! is higher on one side, still has one direction. A part that looks the same from everywhere
 //! after a k-th of a turn is indifferent to the choice.
+//!
+//! Of a fine mesh, a facet is first counted in one of many small cells, and the harmonics are those
+//! of the cells (`cells`).
 
-mod round;
+mod cells;
 
 use super::footprint;
 use crate::measure;
 use crate::mesh::Mesh;
+use geom::circle::Circle;
 use nalgebra::{Complex, Point3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -48,18 +52,21 @@ const CHUNK: usize = 1 << 14;
 #[must_use]
 pub fn reference_azimuth(mesh: &Mesh) -> f64 {
     let Some(surface) = Surface::of(mesh) else { return 0.0 };
-    let by_area = surface.harmonics(LOW, Weight::Area);
-    let first = lowest(&by_area);
-    // A round part of millions of facets is known to be one in less time than this would take.
-    if first.is_none() && surface.is_surely_round() {
-        return 0.0;
-    }
-    let found = first
-        .or_else(|| lowest(&surface.harmonics(LOW, Weight::Height)))
-        .or_else(|| lowest(&surface.harmonics(HIGH, Weight::Area)));
+    let fine = mesh.triangles.len() >= cells::WORTH_IT;
+    let cells = fine.then(|| cells::Cells::of(&surface));
+    let low = |weight| match &cells {
+        Some(cells) => cells.harmonics(weight),
+        None => surface.harmonics(LOW, weight),
+    };
+    let by_area = low(Weight::Area);
+    let found = lowest(&by_area).or_else(|| lowest(&low(Weight::Height))).or_else(|| {
+        // A round part of millions of facets is known to be one in less time than this would take.
+        let round = cells.as_ref().is_some_and(cells::Cells::are_surely_round);
+        if round { None } else { lowest(&surface.harmonics(HIGH, Weight::Area)) }
+    });
     let Some((k, harmonic)) = found else { return 0.0 };
     let directions = (0..k).map(|j| (harmonic.arg() + TAU * f64::from(j)) / f64::from(k));
-    let turn = surface.choose(directions.collect(), by_area).rem_euclid(TAU);
+    let turn = choose(directions.collect(), &by_area, || low(Weight::Height)).rem_euclid(TAU);
     if turn > TAU / 2.0 { turn - TAU } else { turn }
 }
 
@@ -82,8 +89,10 @@ type Place = (Complex<f64>, f64);
 /// A surface about the axis through the centre of its footprint.
 struct Surface<'a> {
     mesh: &'a Mesh,
-    /// One for each vertex.
-    places: Vec<Place>,
+    circle: Circle,
+    /// The height in the middle, and that of the upper half.
+    middle: f64,
+    half_height: f64,
 }
 
 impl<'a> Surface<'a> {
@@ -92,17 +101,18 @@ impl<'a> Surface<'a> {
         let bounds = mesh.bounds();
         let middle = nalgebra::center(&bounds.min, &bounds.max).z;
         let half_height = (bounds.size().z / 2.0).max(f64::MIN_POSITIVE);
-        let place = |p: &Point3<f64>| {
-            let arm = (p.xy() - circle.centre) / circle.radius;
-            (Complex::new(arm.x, arm.y), (p.z - middle) / half_height)
-        };
-        Some(Self { mesh, places: mesh.vertices.par_iter().map(place).collect() })
+        Some(Self { mesh, circle, middle, half_height })
+    }
+
+    fn place(&self, p: &Point3<f64>) -> Place {
+        let arm = (p.xy() - self.circle.centre) / self.circle.radius;
+        (Complex::new(arm.x, arm.y), (p.z - self.middle) / self.half_height)
     }
 
     /// The places of the corners of a triangle, and its area.
     fn triangle(&self, corners: &[u32; 3]) -> ([Place; 3], f64) {
-        let area = measure::area_of(&corners.map(|v| self.mesh.vertices[v as usize]));
-        (corners.map(|v| self.places[v as usize]), area)
+        let corners = corners.map(|v| self.mesh.vertices[v as usize]);
+        (corners.map(|p| self.place(&p)), measure::area_of(&corners))
     }
 
     /// The harmonics 1 … n.
@@ -126,33 +136,27 @@ impl<'a> Surface<'a> {
         let share = if area > 0.0 { 1.0 / area } else { 0.0 };
         (0..n).map(|k| total(k) * share).collect()
     }
+}
 
-    /// Whether no harmonic that is looked at can be one to speak of. When this is not sure, which
-    /// takes no time to find out for small meshes, all of them are computed.
-    fn is_surely_round(&self) -> bool {
-        let mut sums = round::Sums::new();
-        for corners in &self.mesh.triangles {
-            let (places, area) = self.triangle(corners);
-            sums.add(&places, area);
-        }
-        sums.largest(LOW, HIGH) < LEAST
+/// The direction that all low harmonics together prefer.
+fn choose(
+    directions: Vec<f64>,
+    by_area: &[Complex<f64>],
+    by_height: impl FnOnce() -> Vec<Complex<f64>>,
+) -> f64 {
+    if directions.len() == 1 {
+        return directions[0];
     }
-
-    /// The direction that all low harmonics together prefer.
-    fn choose(&self, directions: Vec<f64>, by_area: Vec<Complex<f64>>) -> f64 {
-        if directions.len() == 1 {
-            return directions[0];
+    let by_height = by_height();
+    let families = [by_area, &by_height];
+    let mut best: Option<(f64, Complex<f64>)> = None;
+    for azimuth in directions {
+        let score = families.iter().map(|family| score(family, azimuth)).sum();
+        if best.is_none_or(|(_, best)| is_better(score, best)) {
+            best = Some((azimuth, score));
         }
-        let families = [by_area, self.harmonics(LOW, Weight::Height)];
-        let mut best: Option<(f64, Complex<f64>)> = None;
-        for azimuth in directions {
-            let score = families.iter().map(|family| score(family, azimuth)).sum();
-            if best.is_none_or(|(_, best)| is_better(score, best)) {
-                best = Some((azimuth, score));
-            }
-        }
-        best.map_or(0.0, |(azimuth, _)| azimuth)
     }
+    best.map_or(0.0, |(azimuth, _)| azimuth)
 }
 
 /// Adds the integrals of z, z², … over a triangle of a given area.
