@@ -77,8 +77,8 @@ pub fn fill_layer(
         ..Filled::default()
     };
     if level.index > 0 {
-        let below = neighbours.below.first();
-        let floats = |island: &&Island| below.is_none_or(|below| !rests_on(island, below));
+        let ground = neighbours.below.first().map(|below| Ground::of(below)).unwrap_or_default();
+        let floats = |island: &&Island| !ground.carries(island);
         filled.floating =
             material.filtered(floats).islands().iter().map(|i| frame.floating(i)).collect();
     }
@@ -99,11 +99,44 @@ pub fn fill_layer(
     filled
 }
 
-/// Whether an island has anything below it.
-fn rests_on(island: &Island, below: &Region) -> bool {
-    // Nearly always the first corner decides.
-    island.iter().flatten().any(|&p| below.contains(&mm(p)))
-        || !Region::from_island(island.clone()).intersection(below).is_empty()
+/// What a layer stands on: the islands of the layer below, each with the box around it, so that of
+/// thousands only those are looked at that can matter.
+#[derive(Default)]
+struct Ground<'a>(Vec<([GridPoint; 2], &'a Island)>);
+
+impl<'a> Ground<'a> {
+    fn of(below: &'a Region) -> Self {
+        let boxed = |island: &'a Island| Some((box_around(island)?, island));
+        Self(below.islands().iter().filter_map(boxed).collect())
+    }
+
+    /// Whether an island has anything below it.
+    fn carries(&self, island: &Island) -> bool {
+        let Some([low, high]) = box_around(island) else { return false };
+        let meets = |[a, b]: &[GridPoint; 2]| {
+            a.x <= high.x && low.x <= b.x && a.y <= high.y && low.y <= b.y
+        };
+        let outline = Region::from_island(island.clone());
+        self.0.iter().filter(|(around, _)| meets(around)).any(|(_, below)| {
+            let below = Region::from_island((*below).clone());
+            // Nearly always the first corner decides.
+            island.iter().flatten().any(|&p| below.contains(&mm(p)))
+                || !outline.intersection(&below).is_empty()
+        })
+    }
+}
+
+/// The corners of the smallest box around an island.
+fn box_around(island: &Island) -> Option<[GridPoint; 2]> {
+    let outer = island.first()?;
+    let first = *outer.first()?;
+    let grown = |[low, high]: [GridPoint; 2], p: &GridPoint| {
+        let [mut low, mut high] = [low, high];
+        (low.x, low.y) = (low.x.min(p.x), low.y.min(p.y));
+        (high.x, high.y) = (high.x.max(p.x), high.y.max(p.y));
+        [low, high]
+    };
+    Some(outer.iter().fold([first; 2], grown))
 }
 
 fn fill_island(
