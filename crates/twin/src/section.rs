@@ -2,12 +2,13 @@
 //!
 //! A facet that has corners on both sides of `z = c` gives one directed piece of the outline, from
 //! the side that comes down through the plane to the side that goes up, so that the inside lies on
-//! its left seen from above. Pieces are never chained: area is the sum of their cross products,
+//! its left seen from above. Pieces are never chained: area is the sum of their cross products, put
+//! right along rows where the outline winds round something twice or the wrong way;
 //! length the sum of their lengths, and a place is inside when the pieces wind round it. A corner
 //! at exactly `c` counts as above, so a closed mesh always gives closed outlines. Part frame, mm.
 //!
-//! Limits. The area of shells that overlap is counted as often as they do, holes of an open mesh
-//! leave it undefined; facets that are not finite or name no vertex are left out.
+//! Limits. The length of shells that overlap is counted as often as they do, holes of an open mesh
+//! leave the area undefined; facets that are not finite or name no vertex are left out.
 //!
 //! Layers come from below upwards, so a sweep over facets in slabs of height finds those of one
 //! plane in time proportional to what it cuts.
@@ -153,14 +154,49 @@ impl Slabs {
 }
 
 impl Section {
-    /// Returns the area, mm².
+    /// Returns the area that the outline winds round at all, mm²: what shells share counts once, and
+    /// so does what is turned inside out, as in the print.
     #[must_use]
     pub fn area(&self) -> f64 {
+        let signed = self.signed_area();
+        let is_simple = self.miscounted(ROWS_TO_LOOK).abs() <= NEGLIGIBLE * signed.abs();
+        if is_simple { signed } else { signed + self.miscounted(ROWS_TO_MEASURE) }
+    }
+
+    fn signed_area(&self) -> f64 {
         // Near the outline products are small, so differences lose no digits.
         let Some(first) = self.pieces.first() else { return 0.0 };
         let origin = first.from;
         let twice: f64 = self.pieces.iter().map(|p| (p.from - origin).perp(&(p.to - origin))).sum();
         0.5 * twice
+    }
+
+    /// What the signed area lacks, mm², measured along rows: 0 where the outline winds round all
+    /// that it winds round once, and where it is open.
+    fn miscounted(&self, rows: usize) -> f64 {
+        let rows = rows.min(MOST_CROSSINGS / self.pieces.len().max(1)).max(1);
+        let ends = self.pieces.iter().flat_map(|p| [p.from.y, p.to.y]);
+        let (low, high) =
+            ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
+        let height = (high - low) / rows as f64;
+        if !(height > 0.0 && height.is_finite()) {
+            return 0.0;
+        }
+        let mut crossings: Vec<Vec<(f64, i32)>> = vec![Vec::new(); rows];
+        for piece in &self.pieces {
+            let (a, b, step) = if piece.from.y < piece.to.y {
+                (piece.from, piece.to, -1)
+            } else {
+                (piece.to, piece.from, 1)
+            };
+            // The first row whose middle is not below, for either end.
+            let row = |y: f64| ((y - low) / height - 0.5).ceil().max(0.0) as usize;
+            for (k, crossings) in crossings.iter_mut().enumerate().take(row(b.y)).skip(row(a.y)) {
+                let y = low + (k as f64 + 0.5) * height;
+                crossings.push((a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)), step));
+            }
+        }
+        crossings.iter_mut().map(|row| miscounted_in(row)).sum::<f64>() * height
     }
 
     /// Returns the length of the outline, mm.
@@ -200,6 +236,32 @@ impl Section {
             |piece: &Piece| geom::polyline::distance_to_segment(&piece.from, &piece.to, p);
         self.pieces.iter().map(distance).fold(f64::INFINITY, f64::min)
     }
+}
+
+/// Rows that tell whether an outline winds round anything but once.
+const ROWS_TO_LOOK: usize = 32;
+
+/// Rows that measure what it winds round otherwise: at the worst, a side along the rows, one row in a
+/// thousand is miscounted.
+const ROWS_TO_MEASURE: usize = 1024;
+
+/// Most crossings of rows and pieces, which bounds the memory: fewer rows for huge outlines.
+const MOST_CROSSINGS: usize = 4_000_000;
+
+/// Share of the area that rounding alone may miscount.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// How much longer the places of a row are that the outline winds round than what it counts there;
+/// 0 where the row does not end outside.
+fn miscounted_in(row: &mut [(f64, i32)]) -> f64 {
+    row.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut winding, mut lacking, mut before) = (0, 0.0, 0.0);
+    for &mut (x, step) in row {
+        lacking += (x - before) * f64::from(i32::from(winding != 0) - winding);
+        winding += step;
+        before = x;
+    }
+    if winding == 0 { lacking } else { 0.0 }
 }
 
 /// Returns the volume that the facets enclose, mm³.
@@ -323,6 +385,31 @@ pub(crate) mod tests {
             found.sort_by_key(key);
             assert_eq!(found, expected, "z = {z}");
         }
+    }
+
+    /// The outline of a polygon.
+    fn outline(corners: &[[f64; 2]]) -> Vec<Piece> {
+        let ends = corners.iter().skip(1).chain(corners.first());
+        let point = |c: &[f64; 2]| Point2::new(c[0], c[1]);
+        corners.iter().zip(ends).map(|(a, b)| Piece { from: point(a), to: point(b) }).collect()
+    }
+
+    #[test]
+    fn area_is_what_the_outline_winds_round_however_often() {
+        let square = |x: f64, side: f64| {
+            outline(&[[x, x], [x + side, x], [x + side, x + side], [x, x + side]])
+        };
+        let eight =
+            Section { pieces: outline(&[[0.0, 0.0], [20.0, 20.0], [20.0, 0.0], [0.0, 20.0]]) };
+        assert!((eight.area() - 200.0).abs() < 1e-3, "both lobes: {}", eight.area());
+        let overlapping = Section { pieces: [square(0.0, 20.0), square(10.0, 20.0)].concat() };
+        assert!((overlapping.area() - 700.0).abs() < 0.5, "{}", overlapping.area());
+        let nested = Section { pieces: [square(0.0, 20.0), square(5.0, 10.0)].concat() };
+        assert!((nested.area() - 400.0).abs() < 0.5, "{}", nested.area());
+        let mut hole = square(5.0, 10.0);
+        hole.iter_mut().for_each(|p| std::mem::swap(&mut p.from, &mut p.to));
+        let hollow = Section { pieces: [square(0.0, 20.0), hole].concat() };
+        assert_eq!(hollow.area(), 300.0);
     }
 
     #[test]
