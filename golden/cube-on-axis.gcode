@@ -642,7 +642,7 @@ M140 S0
 M107
 M84
 ; estimated printing time (normal mode) = 51s
-; filament used [mm] = 2.37
+; filament used [mm] = 2.37137
 ; filament used [cm3] = 0.01
 ; filament used [g] = 0.01
 ; total filament used [g] = 0.01

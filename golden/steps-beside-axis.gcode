@@ -527,7 +527,7 @@ M140 S0
 M107
 M84
 ; estimated printing time (normal mode) = 21s
-; filament used [mm] = 5.31
+; filament used [mm] = 5.31116
 ; filament used [cm3] = 0.01
 ; filament used [g] = 0.02
 ; total filament used [g] = 0.02

@@ -655,7 +655,7 @@ M140 S0
 M107
 M84
 ; estimated printing time (normal mode) = 22s
-; filament used [mm] = 5.08
+; filament used [mm] = 5.08465
 ; filament used [cm3] = 0.01
 ; filament used [g] = 0.02
 ; total filament used [g] = 0.02

@@ -12,6 +12,9 @@ use twin::picture::thumbnail::Thumbnail;
 use crate::base64;
 use crate::settings::{Job, KEYS, Kind, Settings, Value};
 
+/// Decimals of the filament words.
+const FILAMENT_DECIMALS: usize = 5;
+
 /// Writes the first lines, the thumbnails and the start program.
 ///
 /// # Errors
@@ -100,7 +103,8 @@ pub fn tail<W: Write>(
     let grams = decimal(volume * material.density_g_per_mm3, 2);
     let layers = material.layers;
     out.comment(&format!("estimated printing time (normal mode) = {}", duration(totals.time)))?;
-    out.comment(&format!("filament used [mm] = {}", decimal(totals.filament, 2)))?;
+    // As exact as the words, so that a reader of the text sees that none of them is missing.
+    out.comment(&format!("filament used [mm] = {:.*}", FILAMENT_DECIMALS, totals.filament))?;
     out.comment(&format!("filament used [cm3] = {}", decimal(volume / 1000.0, 2)))?;
     out.comment(&format!("filament used [g] = {grams}"))?;
     out.comment(&format!("total filament used [g] = {grams}"))?;
@@ -167,7 +171,7 @@ mod tests {
         let text = String::from_utf8(out.finish().unwrap()).unwrap();
         for line in [
             "; estimated printing time (normal mode) = 1m 1s",
-            "; filament used [mm] = 1000",
+            "; filament used [mm] = 1000.00000",
             "; filament used [cm3] = 2.4",
             "; filament used [g] = 2.98",
             "; num_layers = 7",
