@@ -559,6 +559,8 @@ M84
 ; nozzle_half_angle = 15
 ; nozzle_block_height = 30
 ; nozzle_block_radius = 20
+; carriage_height = 60
+; carriage_width = 60
 ; min_layer_height = 0.04
 ; max_layer_height = 0.32
 ; max_nozzle_temperature = 280

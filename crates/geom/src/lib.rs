@@ -7,15 +7,16 @@
 //! planar areas with their booleans, [`offset`] moves their borders, [`simplify`] thins them out;
 //! [`polyline`] measures open and closed lines; [`spiral`] is the Archimedean spiral;
 //! [`circle`] encloses points; [`triangulate`] fills rings with triangles; [`bounding`] finds
-//! boxes that meet.
+//! boxes that meet; [`lift`] says how far a tool must be raised to clear a bead.
 //!
-//! Three other libraries do the groundwork, each named in one module only: the polygon overlay
+//! Three other libraries do the groundwork, each named in one place only: the polygon overlay
 //! engine in [`region`], the Delaunay triangulation in [`triangulate`], the bounding volume
-//! hierarchy in [`bounding`].
+//! hierarchy in [`bounding`], its distances in [`lift`].
 
 pub mod bounding;
 pub mod circle;
 pub mod grid;
+pub mod lift;
 mod nesting;
 pub mod offset;
 pub mod polyline;

@@ -60,6 +60,11 @@ pub struct NozzleShape {
     pub block_height: f64,
     /// How far the block reaches from the axis.
     pub block_radius: f64,
+    /// Height of the underside of the carriage and of the rail it runs on above the face: a beam over
+    /// the whole bed, along the rail.
+    pub carriage_height: f64,
+    /// How wide that beam is, across the rail, with the nozzle in its middle.
+    pub carriage_width: f64,
 }
 
 impl NozzleShape {
@@ -69,6 +74,8 @@ impl NozzleShape {
         half_angle: std::f64::consts::FRAC_PI_6,
         block_height: 12.0,
         block_radius: 20.0,
+        carriage_height: 60.0,
+        carriage_width: 60.0,
     };
 
     /// Returns how high the outline lies above the face at a distance from the axis, mm; infinite

@@ -2,12 +2,14 @@
 //!
 //! A nozzle from above only ever meets the highest material, and a bead rests on the highest that
 //! lies under it; so one height for every cell is all that is needed, and the one before the
-//! present layer, so that neighbours in a layer do not carry each other. Whether a bead rests is asked
+//! present layer, so that neighbours in a layer do not carry each other. Each knows the piece that made
+//! it, whose true shape is kept. Whether a bead rests is asked
 //! where the normal of its layer leads down from it: on a slope that is not the place straight below.
 //! Cells are [`CELL`] wide and
 //! come in tiles, of which only those exist that something was laid on. Part frame, mm.
 
-use nalgebra::{Point2, Point3};
+use geom::lift::Bead;
+use nalgebra::{Point2, Point3, Vector3};
 
 use crate::family::Family;
 
@@ -34,9 +36,13 @@ struct Cell {
     layer: u32,
     /// The stroke that laid it last.
     stroke: u32,
+    /// The pieces whose height `top` and `under` are.
+    top_piece: u32,
+    under_piece: u32,
 }
 
-const BARE: Cell = Cell { top: 0.0, under: 0.0, layer: NONE, stroke: NONE };
+const BARE: Cell =
+    Cell { top: 0.0, under: 0.0, layer: NONE, stroke: NONE, top_piece: NONE, under_piece: NONE };
 
 #[derive(Debug, Clone)]
 struct Tile {
@@ -98,12 +104,39 @@ impl Footing {
     }
 }
 
-/// A place in the pile that rises above a limit.
+/// The shape of a piece: to 0.01 µm on any bed, and half as large as exactly.
+#[derive(Debug, Clone, Copy)]
+struct Shape {
+    ends: [[f32; 3]; 2],
+    /// From its upper to its lower side.
+    down: [f32; 3],
+    width: f32,
+}
+
+impl Shape {
+    fn bead(&self) -> Bead {
+        let ends = self.ends.map(|end| Point3::from(end.map(f64::from)));
+        Bead::new(ends, f64::from(self.width), &Vector3::from(self.down.map(f64::from)))
+    }
+}
+
+/// A piece that rises above a limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Peak {
-    /// Its height above what is allowed there, mm.
+pub(crate) struct Rise {
+    /// The height of one of its cells above what is allowed there, mm.
     pub(crate) above: f64,
+    pub(crate) piece: u32,
+    /// The place of that cell.
     pub(crate) at: Point3<f64>,
+}
+
+/// What may not be risen above: the underside of something, seen from above.
+pub(crate) trait Underside {
+    /// The least allowed height anywhere within `radius` of a place, mm; infinite beside it.
+    fn lowest(&self, about: &Point2<f64>, radius: f64) -> f64;
+
+    /// The square that holds it: its middle, and half its side, mm.
+    fn square(&self) -> (Point2<f64>, f64);
 }
 
 /// How far from what it lies on a bead may end and still rest there, as a share of its thickness.
@@ -119,6 +152,7 @@ pub(crate) struct Pile {
     corner: f64,
     tiles: Vec<Option<Box<Tile>>>,
     greatest: f64,
+    shapes: Vec<Shape>,
 }
 
 impl Pile {
@@ -127,7 +161,8 @@ impl Pile {
         let tile = CELL * TILE as f64;
         let half = (reach / tile).ceil().max(1.0);
         let side = 2 * half as usize;
-        Self { side, corner: -half * tile, tiles: vec![None; side * side], greatest: 0.0 }
+        let tiles = vec![None; side * side];
+        Self { side, corner: -half * tile, tiles, greatest: 0.0, shapes: Vec::new() }
     }
 
     /// Returns the greatest height, mm.
@@ -139,6 +174,12 @@ impl Pile {
     pub(crate) fn lay(&mut self, piece: &Piece) -> Footing {
         let [from, to] = piece.ends;
         let down = piece.family.normal(&nalgebra::center(&from, &to)) * -piece.thickness;
+        let single = |v: [f64; 3]| v.map(|c| c as f32);
+        self.shapes.push(Shape {
+            ends: piece.ends.map(|end| single(end.into())),
+            down: single(down.into()),
+            width: (2.0 * piece.half_width) as f32,
+        });
         let along = to.xy() - from.xy();
         let square = along.norm_squared();
         let reach = piece.half_width * piece.half_width;
@@ -186,10 +227,13 @@ impl Pile {
             *count += 1;
         } else {
             (cell.under, cell.layer) = (cell.top, piece.layer);
+            cell.under_piece = cell.top_piece;
         }
         cell.stroke = piece.stroke;
         let height = top as f32;
-        cell.top = cell.top.max(height);
+        if height > cell.top {
+            (cell.top, cell.top_piece) = (height, (self.shapes.len() - 1) as u32);
+        }
         let block = &mut tile.blocks[y / BLOCK * (TILE / BLOCK) + x / BLOCK];
         *block = block.max(height);
         tile.greatest = tile.greatest.max(height);
@@ -210,70 +254,70 @@ impl Pile {
         }
     }
 
-    /// Returns the place that rises highest above `limit`, which is the allowed height at a
-    /// distance from `axis` and grows with it; `None` when nothing rises above it within `radius`.
-    /// With `layer`, what that layer laid is left out.
-    pub(crate) fn peak(
-        &self,
-        axis: &Point2<f64>,
-        radius: f64,
-        layer: Option<u32>,
-        limit: impl Fn(f64) -> f64,
-    ) -> Option<Peak> {
-        let mut worst: Option<Peak> = None;
+    /// Returns the true shape of a piece.
+    pub(crate) fn bead(&self, piece: u32) -> Bead {
+        self.shapes[piece as usize].bead()
+    }
+
+    /// Returns the pieces with a cell that rises above an underside, the highest above it first. With
+    /// `layer`, what that layer laid is left out.
+    pub(crate) fn rising(&self, under: &impl Underside, layer: Option<u32>) -> Vec<Rise> {
+        let mut found = Vec::new();
+        let (middle, half) = under.square();
         let tiles = |c: f64| self.index(c) / TILE;
-        for row in tiles(axis.y - radius)..=tiles(axis.y + radius) {
-            for column in tiles(axis.x - radius)..=tiles(axis.x + radius) {
+        for row in tiles(middle.y - half)..=tiles(middle.y + half) {
+            for column in tiles(middle.x - half)..=tiles(middle.x + half) {
                 let Some(tile) = &self.tiles[row * self.side + column] else { continue };
                 let origin = [column * TILE, row * TILE];
-                let nearest = self.nearest(axis, origin, TILE);
-                if nearest <= radius && f64::from(tile.greatest) > limit(nearest) {
-                    self.peak_in_tile(tile, origin, (axis, radius), layer, &limit, &mut worst);
+                if f64::from(tile.greatest) > self.lowest(under, origin, TILE) {
+                    self.rising_in_tile(tile, origin, layer, under, &mut found);
                 }
             }
         }
-        worst
+        // Of each piece its highest cell only.
+        found.sort_by(|a, b| a.piece.cmp(&b.piece).then(b.above.total_cmp(&a.above)));
+        found.dedup_by_key(|rise| rise.piece);
+        found.sort_by(|a, b| b.above.total_cmp(&a.above).then(a.piece.cmp(&b.piece)));
+        found
     }
 
-    fn peak_in_tile(
+    fn rising_in_tile(
         &self,
         tile: &Tile,
         origin: [usize; 2],
-        (axis, radius): (&Point2<f64>, f64),
         layer: Option<u32>,
-        limit: &impl Fn(f64) -> f64,
-        worst: &mut Option<Peak>,
+        under: &impl Underside,
+        found: &mut Vec<Rise>,
     ) {
         for (block, &greatest) in tile.blocks.iter().enumerate() {
             let inside = [block % (TILE / BLOCK) * BLOCK, block / (TILE / BLOCK) * BLOCK];
             let from = [origin[0] + inside[0], origin[1] + inside[1]];
-            let nearest = self.nearest(axis, from, BLOCK);
-            if nearest > radius || f64::from(greatest) <= limit(nearest) {
+            if f64::from(greatest) <= self.lowest(under, from, BLOCK) {
                 continue;
             }
             for k in 0..BLOCK * BLOCK {
                 let (x, y) = (k % BLOCK, k / BLOCK);
                 let cell = &tile.cells[(inside[1] + y) * TILE + inside[0] + x];
-                let height = if layer == Some(cell.layer) { cell.under } else { cell.top };
+                let (height, piece) = if layer == Some(cell.layer) {
+                    (cell.under, cell.under_piece)
+                } else {
+                    (cell.top, cell.top_piece)
+                };
                 let at = Point2::new(self.middle(from[0] + x), self.middle(from[1] + y));
-                let distance = (at - axis).norm();
-                let above = f64::from(height) - limit(distance);
-                if distance <= radius && above > worst.map_or(0.0, |peak| peak.above) {
+                let above = f64::from(height) - under.lowest(&at, 0.0);
+                if above > 0.0 && piece != NONE {
                     let at = Point3::new(at.x, at.y, f64::from(height));
-                    *worst = Some(Peak { above, at });
+                    found.push(Rise { above, piece, at });
                 }
             }
         }
     }
 
-    /// The distance of `p` from a square of cells.
-    fn nearest(&self, p: &Point2<f64>, from: [usize; 2], cells: usize) -> f64 {
-        let beyond = |k: usize| {
-            let least = self.corner + from[k] as f64 * CELL;
-            let most = least + cells as f64 * CELL;
-            (least - p[k]).max(p[k] - most).max(0.0)
-        };
-        beyond(0).hypot(beyond(1))
+    /// The least allowed height over a square of cells.
+    fn lowest(&self, under: &impl Underside, from: [usize; 2], cells: usize) -> f64 {
+        let half = 0.5 * cells as f64 * CELL;
+        let middle = |k: usize| self.corner + from[k] as f64 * CELL + half;
+        under.lowest(&Point2::new(middle(0), middle(1)), half * std::f64::consts::SQRT_2)
     }
 
     /// The row or column of a coordinate; the outermost for what lies beyond.
@@ -333,14 +377,32 @@ mod tests {
         let mut pile = Pile::new(50.0);
         pile.lay(&piece(0.0, 0.2, 0, 0));
         pile.lay(&piece(8.0, 3.0, 1, 1));
-        let axis = Point2::new(0.0, 1.0);
-        let limit = |distance: f64| 1.0 + 0.1 * distance;
-        let peak = pile.peak(&axis, 10.0, None, limit).unwrap();
+        let bowl = |radius| Bowl { axis: Point2::new(0.0, 1.0), radius, low: 1.0 };
+        let rise = pile.rising(&bowl(10.0), None)[0];
         // The nearest side of the bead at y = 8.
-        assert!((peak.above - (3.0 - 1.0 - 0.1 * 6.8)).abs() < 0.02, "{peak:?}");
-        assert_eq!(pile.peak(&axis, 10.0, Some(1), limit), None);
-        assert_eq!(pile.peak(&axis, 6.0, None, limit), None);
-        assert_eq!(pile.peak(&axis, 10.0, None, |d| 3.0 + d), None);
+        assert!((rise.above - (3.0 - 1.0 - 0.1 * 6.8)).abs() < 0.02, "{rise:?}");
+        assert_eq!(pile.rising(&bowl(10.0), None), [rise]);
+        assert_eq!(pile.rising(&bowl(10.0), Some(1)), []);
+        assert_eq!(pile.rising(&bowl(6.0), None), []);
+        assert_eq!(pile.rising(&Bowl { low: 3.0, ..bowl(10.0) }, None), []);
+    }
+
+    /// Rises by a tenth of the distance.
+    struct Bowl {
+        axis: Point2<f64>,
+        radius: f64,
+        low: f64,
+    }
+
+    impl Underside for Bowl {
+        fn lowest(&self, about: &Point2<f64>, radius: f64) -> f64 {
+            let distance = ((about - self.axis).norm() - radius).max(0.0);
+            if distance <= self.radius { self.low + 0.1 * distance } else { f64::INFINITY }
+        }
+
+        fn square(&self) -> (Point2<f64>, f64) {
+            (self.axis, self.radius)
+        }
     }
 
     #[test]

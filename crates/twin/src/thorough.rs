@@ -5,9 +5,9 @@
 //! what it lays is added to the pile. A line is what is laid without a move between;
 //! it has a number, so that it can be told from its neighbours.
 
-use machine::kinematics::Alignment;
-use machine::program::Role;
-use nalgebra::{Point3, center};
+use machine::kinematics::{Alignment, Branch};
+use machine::program::{BedTurn, Role};
+use nalgebra::{Point3, Rotation2, Vector2, center};
 
 use crate::check::clearance::Clear;
 use crate::check::coverage::Hollow;
@@ -152,7 +152,9 @@ impl<'a> Watch<'a> {
         let layer = mark.index as u32;
         let place = Place { line: segment.line, layer: segment.layer, at: Some(ends[1]) };
         let height = mark.height.unwrap_or_default();
-        self.clear.tip(&ends[1], (layer, height), place, &self.pile, findings);
+        let alignment = &self.alignment;
+        let rail = || rail_over_part(alignment, segment, &ends[1]);
+        self.clear.tip(&ends[1], (layer, height), place, (&self.pile, rail), findings);
         if !lays {
             return;
         }
@@ -205,4 +207,16 @@ impl<'a> Watch<'a> {
         let [from, to] = segment.part.map(|p| p.z);
         Point3::new(over_part.x, over_part.y, from + (to - from) * share)
     }
+}
+
+/// Where the rail lies over the part while the nozzle is at a place of a segment; of length 1.
+fn rail_over_part(alignment: &Alignment, segment: &Segment, at: &Point3<f64>) -> Vector2<f64> {
+    let joints = segment.joints.map(|[_, to]| to);
+    let is_beyond = joints.is_some_and(|joints| alignment.nozzle(&joints).x < 0.0);
+    let branch = if is_beyond { Branch::Far } else { Branch::Near };
+    let near = joints.map_or(BedTurn::default(), |joints| joints.turn);
+    // Nearer to the axis than the rail comes the nozzle is by rounding only.
+    let turn = alignment.joints_from_part(at, branch, near).map_or(near, |joints| joints.turn);
+    let over_bed = Rotation2::new(alignment.bed.azimuth(turn)) * Vector2::x();
+    alignment.part_from_bed(&over_bed) - alignment.part_from_bed(&Vector2::zeros())
 }

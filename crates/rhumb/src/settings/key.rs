@@ -505,6 +505,20 @@ pub const KEYS: &[Key] = &[
     ),
     number(
         Printer,
+        "carriage_height_mm",
+        "carriage_height",
+        (60.0, 1.0, 1000.0),
+        "height of the underside of the carriage and its rail above the tip",
+    ),
+    number(
+        Printer,
+        "carriage_width_mm",
+        "carriage_width",
+        (60.0, 1.0, 1000.0),
+        "width of the carriage and its rail, across the rail, the nozzle in the middle",
+    ),
+    number(
+        Printer,
         "min_layer_height_mm",
         "min_layer_height",
         (0.04, 0.01, 1.0),

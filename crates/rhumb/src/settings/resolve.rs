@@ -176,6 +176,8 @@ fn printer(get: &Lookup<'_>) -> Printer {
             half_angle: get.number("nozzle_half_angle_deg").to_radians(),
             block_height: get.number("nozzle_block_height_mm"),
             block_radius: get.number("nozzle_block_radius_mm"),
+            carriage_height: get.number("carriage_height_mm"),
+            carriage_width: get.number("carriage_width_mm"),
         },
         axis_clearance: get.number("axis_clearance_mm"),
         moves_per_second: get.number("moves_per_second"),

@@ -1,22 +1,25 @@
 //! Do nozzle and hot end stay clear of everything that was printed before?
 //!
-//! The outline of nozzle and block from the printer's profile stands over the tip every
-//! [`crate::check::support::PIECE`] of the way, travels included, and is compared with the heights
-//! of what was laid (see `pile`).
+//! Nozzle, heater block and carriage from the printer's profile stand over the tip every
+//! [`crate::check::support::PIECE`] of the way, travels included. Where the heights of what was laid
+//! (see `pile`) rise above them, the bodies themselves are compared: how far each would have to be
+//! raised to clear the true beads there (see [`geom::lift`]).
 //!
 //! * The flat face may press [`PRESSED`] layers deep into earlier layers: it irons what is uphill of
 //!   it. What the present layer laid is soft, and the face drags through it wherever a
 //!   layer slopes; that is not judged.
-//! * Cone and block may touch what earlier layers laid beyond the face to [`TOUCHED`], and what the
-//!   present layer laid beyond [`SOFT`] faces.
+//! * Cone, block and carriage may touch what was laid to [`TOUCHED`]; the cone counts from a layer above
+//!   the face, and for what the present layer laid from [`SOFT`] faces off.
+//! * The carriage is a beam over the whole bed, along the rail as it lies over the part there.
 //!
 //! mm, part frame.
 
+use geom::lift::{Tool, lift};
 use machine::profile::{NozzleShape, Printer};
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3, Vector2};
 
 use crate::finding::{Findings, Place};
-use crate::pile::{CELL, Peak, Pile};
+use crate::pile::{CELL, Pile, Rise, Underside};
 
 /// The name of this check.
 pub const NAME: &str = "clearance";
@@ -25,9 +28,8 @@ pub const NAME: &str = "clearance";
 /// the layer below.
 pub const PRESSED: f64 = 1.0;
 
-/// How deep cone and block may reach into what was laid, mm: half a layer, and what a cell of the
-/// pile rises on a slope of 45°.
-pub const TOUCHED: f64 = 0.1 + CELL;
+/// How deep cone, block and carriage may reach into what was laid, mm: half a layer.
+pub const TOUCHED: f64 = 0.1;
 
 /// How far around the nozzle what the present layer laid is soft, in radii of the face.
 pub const SOFT: f64 = 2.0;
@@ -35,74 +37,193 @@ pub const SOFT: f64 = 2.0;
 /// After so many findings no more are looked for: the program is unprintable, and each costs time.
 pub const ENOUGH: usize = 1000;
 
+/// How tall the face's own body and the carriage are, mm: taller than any bead is thick. They come from
+/// above, so more would say nothing.
+const BODY: f64 = 10.0;
+
 /// Judges places of the nozzle.
 #[derive(Debug)]
 pub(crate) struct Clear {
     nozzle: NozzleShape,
+    /// Half the length of the carriage's beam: over all of the bed from anywhere.
+    half_beam: f64,
     deepest: f64,
     found: usize,
+}
+
+/// One body that may run into what was laid.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    what: &'static str,
+    tool: Tool,
+    /// How deep it may reach.
+    limit: f64,
+    /// The layer whose lines it does not mind.
+    ignored: Option<u32>,
 }
 
 impl Clear {
     /// Returns the check for this printer.
     pub(crate) fn new(printer: &Printer) -> Self {
-        Self { nozzle: printer.nozzle, deepest: 0.0, found: 0 }
+        let reach = printer.rail.max.max(-printer.rail.min);
+        Self { nozzle: printer.nozzle, half_beam: 2.0 * reach, deepest: 0.0, found: 0 }
     }
 
-    /// The tip stands at `tip` while a layer `thickness` thick is printed.
+    /// The tip stands at `tip` while a layer `thickness` thick is printed; `rail` says where the rail
+    /// lies over the part.
     pub(crate) fn tip(
         &mut self,
         tip: &Point3<f64>,
         (layer, thickness): (u32, f64),
         place: Place,
-        pile: &Pile,
+        (pile, rail): (&Pile, impl Fn() -> Vector2<f64>),
         findings: &mut Findings,
     ) {
-        if pile.greatest() <= tip.z || self.found >= ENOUGH {
+        // How far anything rises above the tip.
+        let rises = pile.greatest() - tip.z;
+        if rises <= 0.0 || self.found >= ENOUGH {
             return;
         }
-        let face = self.nozzle.flat_radius;
-        let pressed = pile.peak(&tip.xy(), face, Some(layer), |_| tip.z);
-        self.judge("the face of the nozzle", pressed, PRESSED * thickness, place, findings);
-        let outline = |distance: f64| tip.z + self.nozzle.height(distance).max(thickness);
-        // Under the face the cone is as high as at its rim.
-        let rim = |rim: f64| move |distance: f64| outline(distance.max(rim));
-        let radius = self.nozzle.block_radius;
-        let earlier = pile.peak(&tip.xy(), radius, Some(layer), rim(face + CELL));
-        let present = pile.peak(&tip.xy(), radius, None, rim(SOFT * face));
-        let hit = match (earlier, present) {
-            (Some(a), Some(b)) => Some(if b.above > a.above { b } else { a }),
-            (a, b) => a.or(b),
-        };
-        self.judge("the hot end", hit, TOUCHED, place, findings);
+        let limit = PRESSED * thickness;
+        let face =
+            Part { what: "the face of the nozzle", tool: self.face(), limit, ignored: Some(layer) };
+        self.judge(&face, tip, place, pile, findings);
+        let what = "the cone of the nozzle";
+        let soft = self.nozzle.height(SOFT * self.nozzle.flat_radius);
+        for (from, ignored) in [(thickness, Some(layer)), (soft.max(thickness), None)] {
+            if let Some(tool) = self.cone(from) {
+                let cone = Part { what, tool, limit: TOUCHED, ignored };
+                if self.judge(&cone, tip, place, pile, findings) {
+                    break;
+                }
+            }
+        }
+        if rises > self.nozzle.block_height {
+            let part = Part {
+                what: "the heater block",
+                tool: self.block(),
+                limit: TOUCHED,
+                ignored: None,
+            };
+            self.judge(&part, tip, place, pile, findings);
+        }
+        if rises > self.nozzle.carriage_height {
+            let tool = self.carriage(rail());
+            let part = Part { what: "the carriage", tool, limit: TOUCHED, ignored: None };
+            self.judge(&part, tip, place, pile, findings);
+        }
     }
 
+    fn face(&self) -> Tool {
+        Tool::Frustum { radii: [self.nozzle.flat_radius; 2], heights: [0.0, BODY] }
+    }
+
+    /// The cone from a height above the face upwards; `None` when it ends below.
+    fn cone(&self, from: f64) -> Option<Tool> {
+        let NozzleShape { flat_radius, half_angle, block_height, block_radius, .. } = self.nozzle;
+        let top = block_height.min((block_radius - flat_radius) / half_angle.tan());
+        let radius = |height: f64| flat_radius + height * half_angle.tan();
+        let is_left = from < top;
+        is_left.then(|| Tool::Frustum { radii: [radius(from), radius(top)], heights: [from, top] })
+    }
+
+    fn block(&self) -> Tool {
+        let low = self.nozzle.block_height;
+        let heights = [low, self.nozzle.carriage_height.max(low + BODY)];
+        Tool::Frustum { radii: [self.nozzle.block_radius; 2], heights }
+    }
+
+    fn carriage(&self, along: Vector2<f64>) -> Tool {
+        let NozzleShape { carriage_height: low, carriage_width: width, .. } = self.nozzle;
+        Tool::Beam { along, half: [self.half_beam, width / 2.0], heights: [low, low + BODY] }
+    }
+
+    /// Returns whether the part reaches deeper than it may.
     fn judge(
         &mut self,
-        what: &str,
-        peak: Option<Peak>,
-        limit: f64,
+        part: &Part,
+        tip: &Point3<f64>,
         place: Place,
+        pile: &Pile,
         findings: &mut Findings,
-    ) {
-        let Some(Peak { above, at }) = peak else { return };
-        self.deepest = self.deepest.max(above);
-        if above <= limit {
-            return;
+    ) -> bool {
+        // What is neither forbidden nor deeper than anything before need not be known.
+        let least = part.limit.min(self.deepest);
+        let standing = Standing { tool: &part.tool, tip, raised: least };
+        let mut worst: Option<(f64, Rise)> = None;
+        for rise in pile.rising(&standing, part.ignored) {
+            let so_far = worst.map_or(least, |(depth, _)| depth);
+            if least + rise.above <= so_far {
+                break;
+            }
+            if let Some(depth) = lift(&part.tool, tip, &pile.bead(rise.piece), so_far) {
+                worst = Some((depth, rise));
+            }
+        }
+        let Some((depth, Rise { at, .. })) = worst else { return false };
+        self.deepest = self.deepest.max(depth);
+        if depth <= part.limit {
+            return false;
         }
         self.found += 1;
-        findings.warning(NAME, place, (above, limit), || {
+        let Part { what, limit, .. } = part;
+        findings.warning(NAME, place, (depth, *limit), || {
             format!(
-                "{what} reaches {above:.2} mm into what is printed at x {:.1} y {:.1} z {:.2}, at \
+                "{what} reaches {depth:.2} mm into what is printed at x {:.1} y {:.1} z {:.2}, at \
                  most {limit:.2} mm",
                 at.x, at.y, at.z
             )
         });
+        true
     }
 
     /// Returns how deep the nozzle reached into what was printed, mm.
     pub(crate) fn deepest(&self) -> f64 {
         self.deepest
+    }
+}
+
+/// How much wider a body is taken on the cells of the pile: what a bead covers of a cell that is not
+/// its own, and what it rises within one.
+const PAD: f64 = CELL;
+
+/// A body over its place, and raised.
+struct Standing<'a> {
+    tool: &'a Tool,
+    tip: &'a Point3<f64>,
+    raised: f64,
+}
+
+impl Underside for Standing<'_> {
+    fn lowest(&self, about: &Point2<f64>, radius: f64) -> f64 {
+        let from_axis = about - self.tip.xy();
+        let height = match self.tool {
+            Tool::Frustum { radii: [low, high], heights } => {
+                let distance = from_axis.norm() - radius - PAD;
+                if distance <= *low {
+                    heights[0]
+                } else if distance <= *high {
+                    heights[0] + (heights[1] - heights[0]) * (distance - low) / (high - low)
+                } else {
+                    f64::INFINITY
+                }
+            }
+            Tool::Beam { along, half, heights } => {
+                let sides = [from_axis.dot(along), along.perp(&from_axis)];
+                let beyond = |k: usize| (sides[k].abs() - half[k]).max(0.0);
+                let is_under = beyond(0).hypot(beyond(1)) <= radius + PAD;
+                if is_under { heights[0] } else { f64::INFINITY }
+            }
+        };
+        self.tip.z + self.raised + height
+    }
+
+    fn square(&self) -> (Point2<f64>, f64) {
+        let half = match self.tool {
+            Tool::Frustum { radii, .. } => radii[0].max(radii[1]),
+            Tool::Beam { half, .. } => half[0] + half[1],
+        };
+        (self.tip.xy(), half + PAD)
     }
 }
 
@@ -113,21 +234,27 @@ mod tests {
     use crate::pile::Piece;
     use crate::sample::printer;
 
-    /// A wall 10 mm long along x at y = 0 up to `top`, and the tip at `tip`; what is found.
-    fn found(top: f64, tip: [f64; 3]) -> Vec<String> {
+    /// A bead of 0.45 mm from one place to another.
+    fn bead(ends: [[f64; 3]; 2], family: Family) -> Piece {
+        let ends = ends.map(Point3::from);
+        Piece { ends, half_width: 0.225, thickness: 0.2, family, layer: 3, stroke: 0 }
+    }
+
+    /// What is found with the tip at `tip`, the rail along `rail`, after `piece` was laid; and the depth.
+    fn found_beside(piece: &Piece, tip: [f64; 3], rail: [f64; 2]) -> (Vec<String>, f64) {
         let mut pile = Pile::new(60.0);
-        pile.lay(&Piece {
-            ends: [Point3::new(-5.0, 0.0, top), Point3::new(5.0, 0.0, top)],
-            half_width: 0.225,
-            thickness: 0.2,
-            family: Family::Planar,
-            layer: 3,
-            stroke: 0,
-        });
+        pile.lay(piece);
         let (mut check, mut findings) = (Clear::new(&printer()), Findings::default());
-        let place = Place::line(1, None);
-        check.tip(&Point3::from(tip), (4, 0.2), place, &pile, &mut findings);
-        findings.kept().iter().map(|finding| finding.message.clone()).collect()
+        let (place, rail) = (Place::line(1, None), Vector2::from(rail));
+        check.tip(&Point3::from(tip), (4, 0.2), place, (&pile, || rail), &mut findings);
+        let messages = findings.kept().iter().map(|finding| finding.message.clone()).collect();
+        (messages, check.deepest())
+    }
+
+    /// The same beside a wall 10 mm long along x at y = 0 up to `top`.
+    fn found(top: f64, tip: [f64; 3]) -> Vec<String> {
+        let wall = bead([[-5.0, 0.0, top], [5.0, 0.0, top]], Family::Planar);
+        found_beside(&wall, tip, [1.0, 0.0]).0
     }
 
     #[test]
@@ -135,12 +262,57 @@ mod tests {
         assert!(found(5.0, [0.0, 0.0, 5.0]).is_empty());
         assert!(found(5.0, [0.0, 0.3, 4.81]).is_empty());
         assert!(found(5.0, [0.0, 0.3, 4.7])[0].starts_with("the face of the nozzle reaches 0.30"));
-        // 2 mm beside the wall the cone is 1.35 / tan 30° = 2.3 mm above the tip.
-        assert!(found(5.0, [0.0, 2.0, 3.0]).is_empty());
-        assert!(found(5.0, [0.0, 2.0, 2.0])[0].starts_with("the hot end reaches 0.6"));
+        // The round side of the wall is 1.875 - 0.5 off the rim, where the cone is 1.375 / tan 30° less
+        // 0.1 / sin 30° above the tip.
+        assert!(found(5.0, [0.0, 2.0, 2.8]).is_empty());
+        let hit = found(5.0, [0.0, 2.0, 2.0]);
+        let depth = 4.9 - 2.0 - 1.375 * 3.0_f64.sqrt() + 0.2;
+        assert!(
+            hit[0].starts_with(&format!("the cone of the nozzle reaches {depth:.2}")),
+            "{hit:?}"
+        );
         // The block, 12 mm up, reaches 20 mm out.
-        assert!(found(15.0, [0.0, 15.0, 3.2]).is_empty());
-        assert!(found(15.0, [0.0, 15.0, 2.5])[0].starts_with("the hot end reaches 0.50"));
+        assert!(found(15.0, [0.0, 15.0, 3.0]).is_empty());
+        let hit = found(15.0, [0.0, 15.0, 2.5]);
+        assert!(hit.len() == 1 && hit[0].starts_with("the heater block reaches 0.50"), "{hit:?}");
         assert!(found(15.0, [0.0, 20.4, 2.5]).is_empty());
+    }
+
+    #[test]
+    fn only_the_carriage_lies_over_what_is_far_along_the_rail() {
+        let tower = bead([[0.0, 50.0, 62.0], [0.5, 50.0, 62.0]], Family::Planar);
+        let (hit, depth) = found_beside(&tower, [0.0, 0.0, 1.0], [0.0, 1.0]);
+        assert!(hit.len() == 1 && hit[0].starts_with("the carriage reaches 1.00"), "{hit:?}");
+        assert!((depth - 1.0).abs() < 1e-4, "{depth}");
+        // The beam lies elsewhere, or is higher up.
+        assert!(found_beside(&tower, [0.0, 0.0, 1.0], [0.8, 0.6]).0.is_empty());
+        assert!(found_beside(&tower, [0.0, 0.0, 2.0], [0.0, 1.0]).0.is_empty());
+    }
+
+    #[test]
+    fn a_sloped_bead_beside_the_cone_is_clear_that_cells_would_hit() {
+        // A line down the side of a cone, and the nozzle beside it. Cells know its flat upper side
+        // only, which ends where its round side does.
+        let (slope, level) = (1.5_f64, 20.0);
+        let family = Family::Conical { slope };
+        let at = |x: f64| [x, 0.0, level - slope * x];
+        let line = bead([at(6.0), at(8.0)], family);
+        let mut pile = Pile::new(60.0);
+        pile.lay(&line);
+        let clear = Clear::new(&printer());
+        let tool = clear.cone(0.2).unwrap();
+        let mut told_apart = 0;
+        for step in 0..40 {
+            let tip = Point3::new(7.0, 0.9, at(7.0)[2] + 1.0 - 0.03 * f64::from(step));
+            let standing = Standing { tool: &tool, tip: &tip, raised: TOUCHED };
+            let cells = !pile.rising(&standing, None).is_empty();
+            let depth = lift(&tool, &tip, &pile.bead(0), TOUCHED);
+            assert!(cells || depth.is_none(), "{step}: cells do not see {depth:?}");
+            told_apart += u32::from(cells && depth.is_none());
+            let cone = |message: &String| message.starts_with("the cone");
+            let (hit, _) = found_beside(&line, tip.into(), [1.0, 0.0]);
+            assert_eq!(hit.iter().any(cone), depth.is_some(), "{step}: {hit:?}");
+        }
+        assert!((3..30).contains(&told_apart), "{told_apart}");
     }
 }
