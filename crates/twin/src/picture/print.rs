@@ -1,18 +1,22 @@
 //! The whole print, isometric.
 //!
-//! Layers are painted from below upwards, so that what is in front hides what is behind. A bead is
-//! a dark line with a light one on it; walls are lit from the left by the direction that they
+//! What lies lower is painted first, whichever layer it belongs to: the eye looks down, so of two places
+//! behind each other the nearer one is the higher one. A layer of a bowl or a cone is painted in as many
+//! pieces as it has heights. A bead is a dark line with a light one on it; walls are lit from the left by the direction that they
 //! face, which is the side towards the eye. Sparse infill is hidden in nearly every print and left
 //! out, except on the layer drawn last.
 //!
 //! When there are more pieces than may be drawn, every other layer is dropped, then every second
 //! of the rest, and so on; the topmost layer always stays.
 
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+
 use machine::profile::Printer;
 use machine::program::Role;
-use nalgebra::{Point2, Point3, Vector2};
+use nalgebra::{Point2, Point3, Vector2, center};
 
-use super::palette::{AXIS, Colour, INK, of_height, of_role};
+use super::palette::{AXIS, INK, of_height, of_role};
 use super::svg::{Canvas, PathData, Pen};
 use super::trace::{Stroke, Trace, Tracer};
 use crate::segment::Segment;
@@ -154,12 +158,12 @@ pub fn print_svg(mut sink: PrintSink, shade: Shade) -> String {
     let view = View::around(&layers, &sink.axis);
     let mut canvas = Canvas::new(view.size[0], view.size[1]);
     bed(&mut canvas, &view, &sink.axis);
-    let mut below = 0.0;
-    for layer in &layers {
-        let top = layer.traces.first().map_or(0.0, |trace| trace.points[0].z);
-        // What is between two drawn layers is painted by the upper one.
-        paint(&mut canvas, &view, layer, (top - below).abs(), shade);
-        below = top;
+    let mut painting = Painting { view: &view, groups: BTreeMap::new() };
+    for (layer, thickness) in layers.iter().zip(thicknesses(&layers)) {
+        layer.traces.iter().for_each(|trace| painting.add(trace, thickness));
+    }
+    for (group, lines) in &painting.groups {
+        lines.paint(&mut canvas, &view, group, shade);
     }
     canvas.finish()
 }
@@ -243,31 +247,118 @@ fn bed(canvas: &mut Canvas, view: &View, axis: &Point2<f64>) {
     canvas.ellipse(x, y, [6.0, 6.0 * ELEVATION.sin()], &pen);
 }
 
-fn paint(canvas: &mut Canvas, view: &View, layer: &Painted, thickness: f64, shade: Shade) {
-    let mut kinds: Vec<(Role, f64)> = Vec::new();
-    for trace in &layer.traces {
-        if let Stroke::Bead(role, width) = trace.kind
-            && !kinds.contains(&(role, width))
-        {
-            kinds.push((role, width));
-        }
+/// Returns how far each layer reaches down to the drawn one below, mm: what is between two drawn layers
+/// is painted by the upper one.
+fn thicknesses(layers: &[Painted]) -> Vec<f64> {
+    let extent = |layer: &Painted| {
+        let heights = layer.traces.iter().flat_map(|trace| &trace.points).map(|p| p.z);
+        heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(z), high.max(z)])
+    };
+    let mut below = [0.0; 2];
+    let mut found = Vec::new();
+    for layer in layers {
+        let extent = extent(layer);
+        // The bed or the top of the part cuts off one end of a curved layer, not both.
+        found.push((extent[0] - below[0]).abs().max((extent[1] - below[1]).abs()));
+        below = extent;
     }
-    // The outline last: it is nearest to the eye.
-    kinds.sort_by_key(|(role, _)| std::cmp::Reverse(*role));
-    for (role, width) in kinds {
-        let traces: Vec<&Trace> =
-            layer.traces.iter().filter(|trace| trace.kind == Stroke::Bead(role, width)).collect();
-        let z = traces.first().map_or(0.0, |trace| trace.points[0].z);
-        let colour = match shade {
-            Shade::Height => of_height(view.share_of_height(z)),
-            Shade::Role => of_role(role),
-        };
-        let is_wall = matches!(role, Role::ExternalPerimeter | Role::Perimeter);
+    let mut sorted = found.clone();
+    sorted.sort_by(f64::total_cmp);
+    // Where a curved layer begins or ends elsewhere than the one before, that says nothing.
+    let most = JUMP * sorted.get(sorted.len() / 2).copied().unwrap_or_default();
+    found.iter().map(|thickness| thickness.min(most)).collect()
+}
+
+/// Layers are at most so many times thicker than half of them.
+const JUMP: f64 = 2.0;
+
+/// Heights that differ by less than this are painted together, mm: half of a common layer.
+const STEP: f64 = 0.1;
+
+/// A piece rises by no more than this, mm: the width of a bead, within which order is not seen.
+const RISE: f64 = 0.5;
+
+/// What is painted with the same pens, in the order of painting. Lengths in 0.01 mm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Group {
+    /// In [`STEP`].
+    height: i64,
+    /// The outline last: it is nearest to the eye.
+    role: Reverse<Role>,
+    /// How wide it is drawn.
+    side: i64,
+}
+
+/// The lines of a group, by their step of light.
+#[derive(Debug, Clone)]
+struct Lines {
+    edges: Vec<PathData>,
+    ridges: Vec<PathData>,
+}
+
+/// Sorts pieces into groups.
+struct Painting<'a> {
+    view: &'a View,
+    groups: BTreeMap<Group, Lines>,
+}
+
+impl Painting<'_> {
+    fn add(&mut self, trace: &Trace, thickness: f64) {
+        let Stroke::Bead(role, width) = trace.kind else { return };
+        let look = Look::of(role);
         // Walls reach down to the drawn layer below, also where they lean; fill is seen from
         // above only.
-        let side = if is_wall { width.max(thickness * LEANING) } else { width };
-        let look = if is_wall { Look::Wall } else { Look::Fill };
-        strokes(canvas, view, &traces, colour, side * view.scale, look);
+        let side = if look == Look::Wall { width.max(thickness * LEANING) } else { width };
+        let side = (side * 100.0).round();
+        let rise = if look == Look::Wall { 0.16 * side / 100.0 * self.view.scale } else { 0.0 };
+        let mut last = None;
+        for pair in trace.points.windows(2) {
+            let step = look.step(&pair[0], &pair[1]);
+            let pieces = ((pair[1].z - pair[0].z).abs() / RISE).ceil().max(1.0);
+            let at = |k: f64| pair[0] + (pair[1] - pair[0]) * (k / pieces);
+            for k in 0..pieces as u32 {
+                let ends = [at(f64::from(k)), at(f64::from(k) + 1.0)];
+                let height = (center(&ends[0], &ends[1]).z / STEP).round() as i64;
+                let group = Group { height, role: Reverse(role), side: side as i64 };
+                let goes_on = last == Some((group, step));
+                let pixels = ends.map(|end| self.view.pixel(&end));
+                let lines = self.groups.entry(group).or_insert_with(Lines::none);
+                lines.add(step, pixels, rise, goes_on);
+                last = Some((group, step));
+            }
+        }
+    }
+}
+
+impl Lines {
+    fn none() -> Self {
+        let none = vec![PathData::with_decimals(1); STEPS + 1];
+        Self { edges: none.clone(), ridges: none }
+    }
+
+    fn add(&mut self, step: usize, pixels: [[f64; 2]; 2], rise: f64, goes_on: bool) {
+        for (data, up) in [(&mut self.edges, 0.0), (&mut self.ridges, rise)] {
+            if !goes_on {
+                data[step].move_to(pixels[0][0], pixels[0][1] - up);
+            }
+            data[step].line_to(pixels[1][0], pixels[1][1] - up);
+        }
+    }
+
+    fn paint(&self, canvas: &mut Canvas, view: &View, group: &Group, shade: Shade) {
+        let Reverse(role) = group.role;
+        let colour = match shade {
+            Shade::Height => of_height(view.share_of_height(group.height as f64 * STEP)),
+            Shade::Role => of_role(role),
+        };
+        let (look, width) = (Look::of(role), group.side as f64 / 100.0 * view.scale);
+        for (step, data) in self.edges.iter().enumerate() {
+            canvas.path(data, &Pen::new(colour.lit(0.72 * look.brightness(step)), width));
+        }
+        for (step, data) in self.ridges.iter().enumerate() {
+            let pen = Pen::new(colour.lit(look.brightness(step)), width * look.ridge(step));
+            canvas.path(data, &pen);
+        }
     }
 }
 
@@ -281,6 +372,11 @@ enum Look {
 }
 
 impl Look {
+    fn of(role: Role) -> Self {
+        let is_wall = matches!(role, Role::ExternalPerimeter | Role::Perimeter);
+        if is_wall { Self::Wall } else { Self::Fill }
+    }
+
     /// The step of light or width of a piece, up to [`STEPS`].
     fn step(self, from: &Point3<f64>, to: &Point3<f64>) -> usize {
         let along = (to - from).xy();
@@ -320,40 +416,6 @@ impl Look {
                 0.7 * sin / length
             }
         }
-    }
-}
-
-fn strokes(
-    canvas: &mut Canvas,
-    view: &View,
-    traces: &[&Trace],
-    colour: Colour,
-    width: f64,
-    look: Look,
-) {
-    let mut edges: Vec<PathData> = vec![PathData::with_decimals(1); STEPS + 1];
-    let mut ridges = edges.clone();
-    let rise = if look == Look::Wall { 0.16 * width } else { 0.0 };
-    for trace in traces {
-        let mut last = None;
-        for pair in trace.points.windows(2) {
-            let step = look.step(&pair[0], &pair[1]);
-            let pixels = [view.pixel(&pair[0]), view.pixel(&pair[1])];
-            for (data, up) in [(&mut edges, 0.0), (&mut ridges, rise)] {
-                if last != Some(step) {
-                    data[step].move_to(pixels[0][0], pixels[0][1] - up);
-                }
-                data[step].line_to(pixels[1][0], pixels[1][1] - up);
-            }
-            last = Some(step);
-        }
-    }
-    for (step, data) in edges.iter().enumerate() {
-        canvas.path(data, &Pen::new(colour.lit(0.72 * look.brightness(step)), width));
-    }
-    for (step, data) in ridges.iter().enumerate() {
-        let pen = Pen::new(colour.lit(look.brightness(step)), width * look.ridge(step));
-        canvas.path(data, &pen);
     }
 }
 
@@ -400,6 +462,46 @@ mod tests {
         let count = tight.kept_count + tight.last.as_ref().map_or(0, |last| last.count);
         assert!(count <= all / 3);
         assert_eq!(tight.last.map(|last| last.ordinal), Some(99));
+    }
+
+    #[test]
+    fn the_far_side_of_a_bowl_is_painted_before_its_near_rim() {
+        // One layer: the rim first, 10 mm up, then the bottom of the bowl and a line up its side.
+        let mut sink = PrintSink::new(1000, &printer());
+        for (from, to) in
+            [([20.0, 10.0], [20.0, 10.0]), ([2.0, 1.0], [2.0, 1.0]), ([2.0, 1.0], [20.0, 10.0])]
+        {
+            let turn = if from == to { 1.0 } else { 0.0 };
+            let mut line = segment(joints(from[0], 0.0, from[1]), joints(to[0], turn, to[1]), 20.0);
+            (line.layer, line.filament) = (Some(0), 0.1);
+            sink.add(&line);
+        }
+        sink.end_layer();
+        let layers: Vec<Painted> = sink.last.take().into_iter().collect();
+        let view = View::around(&layers, &sink.axis);
+        let mut painting = Painting { view: &view, groups: BTreeMap::new() };
+        layers[0].traces.iter().for_each(|trace| painting.add(trace, 0.2));
+        let heights: Vec<i64> = painting.groups.keys().map(|group| group.height).collect();
+        assert!(heights.is_sorted() && heights.len() > 18, "{heights:?}");
+        assert_eq!((heights[0], heights[heights.len() - 1]), (10, 100));
+    }
+
+    #[test]
+    fn layers_reach_down_to_the_drawn_one_below() {
+        let layer = |heights: [f64; 2]| Painted {
+            ordinal: 0,
+            traces: vec![Trace {
+                kind: Stroke::Travel,
+                points: heights.map(|z| Point3::new(0.0, 0.0, z)).to_vec(),
+            }],
+            count: 1,
+        };
+        // Bowls that the bed cuts off, then the rim does, then a tower elsewhere.
+        let bowls = [[0.2, 8.0], [0.2, 8.3], [0.5, 8.4], [0.8, 8.4], [1.1, 30.0]].map(layer);
+        let expected = [0.6, 0.3, 0.3, 0.3, 0.6];
+        for (found, expected) in thicknesses(&bowls).iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
     }
 
     #[test]
