@@ -100,14 +100,15 @@ fn what_is_malformed_is_status_4() {
         (b"PK\x03\x04 and what else a 3MF holds, which is a ZIP archive ......", "WrongFormat"),
     ];
     for (bytes, class) in cases {
-        refused("model.stl", bytes, &[], class, 4);
+        let ran = refused("model.stl", bytes, &[], class, 4);
+        assert!(ran.err.contains("]: model.stl: "), "{}", ran.err);
     }
 }
 
 #[test]
 fn what_cannot_be_printed_is_status_5() {
-    let inches = refused("cube.stl", &cube(), &["--scale", "20"], "OutOfEnvelope", 5);
-    assert!(inches.err.contains("282.8 mm") && inches.err.contains("120 mm"), "{}", inches.err);
+    let inches = refused("cube.stl", &cube(), &["--scale", "10"], "OutOfEnvelope", 5);
+    assert!(inches.err.contains("141.4 mm") && inches.err.contains("120 mm"), "{}", inches.err);
     let tall = refused(
         "cube.stl",
         &cube(),
@@ -248,4 +249,14 @@ fn errors_can_be_read_by_programs() {
     assert_eq!(error["error"]["exit"], 3);
     assert!(error["error"]["message"].as_str().unwrap().contains("absent.stl"));
     assert!(ran.out.is_empty());
+    for wrong in [["slize", "--error-format", "json"], ["slice", "--error-format=json", "--none"]] {
+        let ran = scratch.run(&wrong).expect(2);
+        let error: serde_json::Value = serde_json::from_str(&ran.err).unwrap();
+        assert_eq!(
+            (&error["error"]["class"], &error["error"]["exit"]),
+            (&"Usage".into(), &2.into())
+        );
+    }
+    let said = scratch.run(&["slize"]).expect(2).err;
+    assert!(said.starts_with("error[Usage]: unrecognized subcommand 'slize'"), "{said}");
 }

@@ -163,3 +163,16 @@ fn the_slicer_knows_no_machine() {
         }
     }
 }
+
+/// A model, a setting or a program is data. Only tests start processes.
+#[test]
+fn nothing_is_run_because_a_file_says_so() {
+    let crates = std::fs::read_dir(root().join("crates")).unwrap();
+    let sources: Vec<PathBuf> =
+        crates.flat_map(|folder| files_below(&folder.unwrap().path().join("src"))).collect();
+    assert!(sources.len() > 100, "{} files are not the program", sources.len());
+    for source in sources.iter().filter(|path| path.extension().is_some_and(|end| end == "rs")) {
+        let text = std::fs::read_to_string(source).unwrap();
+        assert!(!text.contains("process::Command"), "{} starts processes", source.display());
+    }
+}

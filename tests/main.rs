@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod budgets;
 mod bundled;
 mod cli;
 mod comparison;
@@ -18,6 +19,7 @@ mod limits;
 mod motor;
 mod mutants;
 mod names;
+mod outputs;
 mod preview;
 mod program;
 mod relief;

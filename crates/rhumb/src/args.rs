@@ -249,6 +249,9 @@ pub struct Slice {
     /// Do not check the finished program
     #[arg(long, conflicts_with = "verify")]
     pub no_verify: bool,
+    /// Refuse models whose facets are cut by layers more often than this, in millions: work for hours
+    #[arg(long, value_name = "MILLIONS", default_value_t = 1000.0)]
+    pub most_cuts: f64,
 }
 
 /// How far a program is checked.

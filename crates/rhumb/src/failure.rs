@@ -34,6 +34,7 @@ const CLASSES: &[(&str, u8)] = &[
     ("OutputDenied", 7),
     ("OutputFull", 7),
     ("OutputIsDirectory", 7),
+    ("OutputTwice", 7),
     ("LimitExceeded", 8),
     ("SelfCheckFailed", 9),
     ("ScanFailed", 10),
@@ -66,6 +67,23 @@ impl Failure {
     pub fn new(class: &'static str, message: impl Into<String>) -> Self {
         debug_assert!(CLASSES.iter().any(|(name, _)| *name == class), "{class} has no exit status");
         Self { class, message: message.into(), hint: None }
+    }
+
+    /// Says which file it is about, unless the message does already.
+    #[must_use]
+    pub fn about(mut self, file: &std::path::Path) -> Self {
+        let name = match file.to_string_lossy() {
+            name if name == "-" => "standard input".into(),
+            name => name,
+        };
+        if !self.message.contains(&*name) {
+            // The end of a long path tells more than its begin, and the message must have room.
+            let skipped = name.chars().count().saturating_sub(LONGEST_NAME);
+            let end: String = name.chars().skip(skipped).collect();
+            let cut = if skipped > 0 { "..." } else { "" };
+            self.message = format!("{cut}{end}: {}", self.message);
+        }
+        self
     }
 
     /// Adds what the user can do.
@@ -102,6 +120,9 @@ impl Failure {
 
 /// Longest message, in characters: what comes from a hostile file must not fill a terminal.
 const LONGEST_MESSAGE: usize = 1000;
+
+/// Longest name of a file in a message, in characters.
+const LONGEST_NAME: usize = 200;
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -141,6 +162,10 @@ mod tests {
         );
         assert_eq!(failure.exit_status(), 5);
         assert!(Failure::new("Usage", "x".repeat(9999)).to_string().len() < 1100);
+        let long = format!("{}/cube.stl", "x".repeat(999));
+        let named = Failure::new("NoVolume", "no inside").about(long.as_ref()).to_string();
+        assert!(named.ends_with("x/cube.stl: no inside") && named.len() < 300, "{named}");
+        assert_eq!(failure.clone().about("part".as_ref()), failure, "it is named already");
         let json: serde_json::Value = serde_json::from_str(&failure.to_json()).unwrap();
         assert_eq!(json["error"]["exit"], 5);
     }

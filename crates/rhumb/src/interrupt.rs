@@ -25,6 +25,17 @@ impl Interrupt {
         interrupt
     }
 
+    /// Lets a file that grows beyond what the user may write be a failed write, as on a full disk,
+    /// and not the end of the process.
+    pub fn outlive_limits_of_size() {
+        #[cfg(unix)]
+        {
+            let nobody_asks = Arc::new(AtomicBool::new(false));
+            // Without a handler the signal ends the process; the target is still safe.
+            let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, nobody_asks);
+        }
+    }
+
     /// Goes on, or stops where it was asked to.
     ///
     /// # Errors

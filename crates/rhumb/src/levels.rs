@@ -84,6 +84,33 @@ pub(crate) fn check_count(layers: f64) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Refuses, before it is begun, work that would take hours: how often layers cut facets is known from
+/// the heights of both.
+///
+/// # Errors
+///
+/// `LimitExceeded`.
+pub(crate) fn check_cuts(part: &Mesh, layers: usize, job: &Job) -> Result<(), Failure> {
+    let top = part.bounds().max.z;
+    let height = |corners: &[u32; 3]| {
+        let z = corners.map(|k| part.vertices[k as usize].z);
+        z[0].max(z[1]).max(z[2]) - z[0].min(z[1]).min(z[2])
+    };
+    let heights: f64 = part.triangles.iter().map(height).sum();
+    let cuts = layers as f64 * (heights / top).max(1.0);
+    if cuts <= job.most_cuts {
+        return Ok(());
+    }
+    let what = format!(
+        "{layers} layers would cut {} facets {:.0} million times; the limit is {} million",
+        part.triangles.len(),
+        cuts / 1e6,
+        job.most_cuts / 1e6
+    );
+    Err(Failure::new("LimitExceeded", what)
+        .hint("make the mesh coarser, choose thicker layers, or raise --most-cuts"))
+}
+
 fn check_cost(top: f64, job: &Job) -> Result<(), Failure> {
     let cost = cost(top, &job.schedule);
     check_count(cost.layers)?;

@@ -7,16 +7,19 @@ use clap::Parser;
 use rhumb::args::{Arguments, Color, ErrorFormat};
 use rhumb::commands;
 use rhumb::failure::Failure;
+use rhumb::interrupt::Interrupt;
 
 fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) => {
+        Err(error) if error.use_stderr() => return misused(&error),
+        Err(help) => {
             // A closed pipe after --help is nobody's fault.
-            let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+            let _ = help.print();
+            return ExitCode::SUCCESS;
         }
     };
+    Interrupt::outlive_limits_of_size();
     std::panic::set_hook(Box::new(|_| {}));
     let manner = arguments.manner.clone();
     let threads = manner.threads.map_or(0, usize::from);
@@ -49,6 +52,31 @@ fn bug(panic: &(dyn std::any::Any + Send)) -> Failure {
         .unwrap_or("unknown");
     Failure::new("Bug", format!("rhumb has a bug: {what}"))
         .hint("please report it with the model and the command; nothing was written")
+}
+
+/// Says what is wrong with the command line, in the form that it asks for as far as it can be told.
+fn misused(error: &clap::Error) -> ExitCode {
+    let arguments: Vec<_> = std::env::args_os().collect();
+    let wants_json = arguments.windows(2).any(|pair| pair == ["--error-format", "json"])
+        || arguments.iter().any(|argument| argument == "--error-format=json");
+    let plain = error.render().to_string();
+    let said = plain.strip_prefix("error: ");
+    let mut err = std::io::stderr().lock();
+    if wants_json {
+        let message =
+            said.map_or("a command is missing", |said| said.split("\n\n").next().unwrap_or(said));
+        let message: Vec<&str> = message.split_whitespace().collect();
+        let failure = Failure::new("Usage", message.join(" ")).hint("for more, try --help");
+        let _ = writeln!(err, "{}", failure.to_json());
+        return ExitCode::from(failure.exit_status());
+    }
+    let text = match (err.is_terminal(), said) {
+        (true, _) => error.render().ansi().to_string().replacen("error:", "error[Usage]:", 1),
+        (false, Some(said)) => format!("error[Usage]: {said}"),
+        (false, None) => plain,
+    };
+    let _ = write!(err, "{text}");
+    ExitCode::from(2)
 }
 
 fn complain(failure: &Failure, format: ErrorFormat, color: Color) {

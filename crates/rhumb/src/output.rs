@@ -109,6 +109,52 @@ impl Drop for Output {
     }
 }
 
+/// Refuses outputs that are an input, or one file twice. `-` and devices may be named twice, as far as
+/// that goes: standard output takes one output only.
+///
+/// # Errors
+///
+/// `OutputIsInput`, `OutputTwice`, `OutputIsDirectory` or `OutputDenied`.
+pub fn keep_apart(inputs: &[&Path], outputs: &[&Path]) -> Result<(), Failure> {
+    let mut taken: Vec<(PathBuf, &Path)> = Vec::new();
+    for &output in outputs {
+        let place = if output == Path::new("-") {
+            output.to_owned()
+        } else {
+            match destination(output, inputs)? {
+                Destination::File(path) => absolute(&path),
+                Destination::InPlace(_) | Destination::StandardOutput => continue,
+            }
+        };
+        let is_same = |(other, _): &&(PathBuf, &Path)| *other == place || is_linked(other, &place);
+        if let Some((_, first)) = taken.iter().find(is_same) {
+            let what = if output == Path::new("-") {
+                "two outputs cannot both go to standard output".to_owned()
+            } else {
+                format!("{} and {} are one file", first.display(), output.display())
+            };
+            return Err(Failure::new("OutputTwice", what).hint("give every output its own name"));
+        }
+        taken.push((place, output));
+    }
+    Ok(())
+}
+
+/// Whether two paths are names of one file that is there.
+fn is_linked(a: &Path, b: &Path) -> bool {
+    fs::metadata(b).is_ok_and(|b_metadata| is_same_file(a, &b_metadata, b))
+}
+
+/// A path in one form only, whether or not its file is there yet.
+fn absolute(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|parent| *parent != Path::new(""));
+    let folder = fs::canonicalize(folder.unwrap_or(Path::new(".")));
+    match (folder, path.file_name()) {
+        (Ok(folder), Some(name)) => folder.join(name),
+        _ => path.to_owned(),
+    }
+}
+
 /// Says what went wrong while writing.
 #[must_use]
 pub fn failed(target: &Path, error: &io::Error) -> Failure {

@@ -25,10 +25,10 @@ use twin::picture::thumbnail::Thumbnail;
 
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
-use crate::levels::Layout;
+use crate::levels::{Layout, check_cuts};
 use crate::output;
 use crate::overhang::{Overhang, overhangs};
-use crate::place::{Fit, Placed, Wish, check_envelope, place, suspect_units};
+use crate::place::{Fit, Placed, Wish, check_envelope, check_size, place, suspect_units};
 use crate::program_text;
 use crate::progress::Progress;
 use crate::report::{Timings, Warning};
@@ -104,6 +104,7 @@ pub fn slice(
     let read_ms = clock.lap();
     watch.progress.stage("repair", 1);
     let soup = if request.wish.scale == 1.0 { soup } else { soup.scaled(request.wish.scale) };
+    check_size(&soup, request.job)?;
     let (solid, health) = solid_from_soup(&soup).map_err(|e| unusable(e.class(), &e, e.hint()))?;
     let health = health.with_read(&read);
     drop(soup);
@@ -117,6 +118,7 @@ pub fn slice(
     let orient_ms = clock.lap();
 
     let (stages, mut layout) = stages(&placed.solid, job)?;
+    check_cuts(placed.solid.mesh(), stages.iter().map(|stage| stage.printed.len()).sum(), job)?;
     warnings.extend(layout.warnings(job.schedule.snap));
     let curved = stages.iter().find(|stage| stage.kind != LayerKind::Planar);
     let overhang = curved

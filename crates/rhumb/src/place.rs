@@ -1,11 +1,13 @@
 //! How the model comes to stand on the bed.
 
+use geom::bounding::Bounds;
 use mesh::measure;
 use mesh::mesh::Mesh;
 use mesh::orient::{OrientParams, Rest, candidates, laid, rest};
 use mesh::place::{Placement, footprint, reference_azimuth};
+use mesh::soup::{Facet, Soup};
 use mesh::topology::Solid;
-use nalgebra::{Point2, Rotation3, Vector3};
+use nalgebra::{Point2, Point3, Rotation3, Vector3};
 
 use crate::failure::Failure;
 use crate::settings::Job;
@@ -164,6 +166,42 @@ pub enum Fit {
     Barely,
 }
 
+/// Checks, before anything is done with them, that the corners of a model are not farther apart than
+/// the machine could ever hold, however the model is laid down. Facets of two corners do not count:
+/// a repair takes them away.
+///
+/// # Errors
+///
+/// `OutOfEnvelope`, with a guess at the units where that would explain it.
+pub fn check_size(soup: &Soup, job: &Job) -> Result<(), Failure> {
+    let mut bounds = Bounds::default();
+    let is_facet = |[a, b, c]: &&Facet| a != b && b != c && c != a;
+    for corner in soup.facets.iter().filter(is_facet).flatten() {
+        bounds.add(&Point3::from(corner.map(f64::from)));
+    }
+    if bounds.is_empty() {
+        return Ok(());
+    }
+    let size = bounds.size();
+    let most = (2.0 * job.printer.rail.max).hypot(job.printer.lift.max);
+    // A model of exactly that size is measured again where it lies.
+    if size.max() <= most + 1.0 {
+        return Ok(());
+    }
+    let what = format!(
+        "the model measures {} x {} x {} mm; the machine holds nothing longer than {most:.1} mm",
+        length(size.x),
+        length(size.y),
+        length(size.z)
+    );
+    Err(Failure::new("OutOfEnvelope", what).hint(too_large(&size, job)))
+}
+
+/// A length for people, however large.
+fn length(mm: f64) -> String {
+    if mm < 1e9 { format!("{mm:.1}") } else { format!("{mm:.1e}") }
+}
+
 /// Checks that the part is within reach and not too tall.
 ///
 /// # Errors
@@ -272,6 +310,20 @@ mod tests {
 
     fn placed(mesh: Mesh, wish: &Wish) -> Placed {
         place(Solid::new(mesh), wish, &job().orient).unwrap()
+    }
+
+    #[test]
+    fn one_far_corner_is_refused_before_any_work() {
+        let far = |x: f32| Soup { facets: vec![[[0.0; 3], [x, 0.0, 0.0], [0.0, 9.0, 1.0]]] };
+        let refused = check_size(&far(1e30), &job()).unwrap_err();
+        assert_eq!(refused.class(), "OutOfEnvelope");
+        assert!(refused.to_string().contains("1.0e30 x 9.0 x 1.0 mm"), "{refused}");
+        // From corner to corner of the machine, 312.4 mm.
+        assert!(
+            check_size(&far(312.0), &job()).is_ok() && check_size(&far(314.0), &job()).is_err()
+        );
+        let needle = Soup { facets: vec![[[0.0; 3], [1e30, 0.0, 0.0], [0.0; 3]]] };
+        assert!(check_size(&needle, &job()).is_ok(), "it has no area and goes away");
     }
 
     #[test]

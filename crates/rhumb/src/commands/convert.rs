@@ -85,7 +85,7 @@ impl Source {
 }
 
 /// Where the program goes: `IN.polar.gcode` in the working folder unless the user says.
-fn target(arguments: &Convert) -> PathBuf {
+pub(super) fn target(arguments: &Convert) -> PathBuf {
     arguments.output.clone().unwrap_or_else(|| {
         let stem = arguments.program.file_stem().filter(|_| arguments.program != Path::new("-"));
         let mut name = stem.unwrap_or("program".as_ref()).to_owned();

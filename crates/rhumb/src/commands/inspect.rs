@@ -3,9 +3,8 @@
 use std::fmt::Write as _;
 
 use machine::gcode::decimal;
-use mesh::health::{Health, solid_from_soup};
+use mesh::health::Health;
 use mesh::overlap::self_intersections;
-use mesh::stl;
 use mesh::topology::Solid;
 
 use super::{DONE, LOOK, display_name, say, say_json};
@@ -19,11 +18,7 @@ const MOST_CROSSINGS: usize = 1000;
 
 pub(super) fn run(arguments: &Inspect, manner: &Manner) -> Result<u8, Failure> {
     let bytes = input::read(&arguments.model)?;
-    let (soup, read) = stl::read(&bytes)
-        .map_err(|error| with_hint(Failure::new(error.class(), error.to_string()), error.hint()))?;
-    let (solid, health) = solid_from_soup(&soup)
-        .map_err(|error| with_hint(Failure::new(error.class(), error.to_string()), error.hint()))?;
-    let health = health.with_read(&read);
+    let (solid, health) = super::solid(&arguments.model, &bytes, 1.0)?;
     let crossings = self_intersections(&solid, MOST_CROSSINGS).len();
     if manner.json {
         say_json(&as_json(&display_name(&arguments.model), &solid, &health, crossings))?;
@@ -31,13 +26,6 @@ pub(super) fn run(arguments: &Inspect, manner: &Manner) -> Result<u8, Failure> {
         say(&as_text(&solid, &health, crossings))?;
     }
     Ok(if health.guessed { LOOK } else { DONE })
-}
-
-fn with_hint(failure: Failure, hint: Option<String>) -> Failure {
-    match hint {
-        Some(hint) => failure.hint(hint),
-        None => failure,
-    }
 }
 
 fn as_json(name: &str, solid: &Solid, health: &Health, crossings: usize) -> serde_json::Value {

@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod convert;
+mod files;
 mod inspect;
 mod model;
 mod motor;
@@ -15,6 +16,10 @@ mod verify;
 
 use std::io::{self, Write};
 use std::path::Path;
+
+use mesh::health::{Health, solid_from_soup};
+use mesh::stl;
+use mesh::topology::Solid;
 
 use crate::args::{Arguments, Command, PlaceArguments, SettingsArguments};
 use crate::calibration::Calibration;
@@ -37,6 +42,7 @@ pub const LOOK: u8 = 1;
 /// Why it could not go on.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let manner = &arguments.manner;
+    files::check(&arguments.command)?;
     match &arguments.command {
         Command::Slice(arguments) => slice::run(arguments, manner),
         Command::Inspect(arguments) => inspect::run(arguments, manner),
@@ -85,6 +91,20 @@ fn settings(arguments: &SettingsArguments) -> Result<(Settings, Job), Failure> {
         calibration.apply(&mut job.printer, job.bed_map_fade)?;
     }
     Ok((settings, job))
+}
+
+/// Reads the mesh of a file; `scale` multiplies its coordinates.
+fn solid(path: &Path, bytes: &[u8], scale: f64) -> Result<(Solid, Health), Failure> {
+    let unusable = |class, message: String, hint: Option<String>| {
+        let failure = Failure::new(class, message).about(path);
+        hint.map_or(failure.clone(), |hint| failure.hint(hint))
+    };
+    let (soup, read) = stl::read(bytes)
+        .map_err(|error| unusable(error.class(), error.to_string(), error.hint()))?;
+    let soup = if scale == 1.0 { soup } else { soup.scaled(scale) };
+    let (solid, health) = solid_from_soup(&soup)
+        .map_err(|error| unusable(error.class(), error.to_string(), error.hint()))?;
+    Ok((solid, health.with_read(&read)))
 }
 
 fn wish(arguments: &PlaceArguments) -> Result<Wish, Failure> {

@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use machine::gcode::decimal;
-use mesh::health::solid_from_soup;
 use mesh::mesh::Mesh;
 use mesh::orient::{Candidate, Rating, Rest, candidates, rate, rest};
 use mesh::{measure, stl};
@@ -30,10 +29,7 @@ pub(super) fn run(arguments: &Orient, manner: &Manner) -> Result<u8, Failure> {
     let (_, job) = settings(&arguments.settings)?;
     let wish = wish(&arguments.place)?;
     let bytes = input::read(&arguments.model)?;
-    let failed = |class: &'static str, message: String| Failure::new(class, message);
-    let (soup, _) = stl::read(&bytes).map_err(|e| failed(e.class(), e.to_string()))?;
-    let (solid, _) =
-        solid_from_soup(&soup.scaled(wish.scale)).map_err(|e| failed(e.class(), e.to_string()))?;
+    let (solid, _) = super::solid(&arguments.model, &bytes, wish.scale)?;
     if let Some(target) = &arguments.output {
         let placed = place(solid.clone(), &wish, &job.orient)?;
         write_file(target, &[&arguments.model], &stl::write(placed.solid.mesh()))?;

@@ -27,7 +27,8 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     let mut total = Stopwatch::start();
     let mut wanted = arguments.settings.clone();
     wanted.set.extend(arguments.layers.set());
-    let (settings, job) = settings(&wanted)?;
+    let (settings, mut job) = settings(&wanted)?;
+    job.most_cuts = arguments.most_cuts * 1e6;
     let wish = wish(&arguments.place)?;
     let target = target(arguments);
     let model = input::read(&arguments.model)?;
@@ -54,7 +55,8 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
             made_at: &clock::now(),
         };
         let watch = &mut Watch { progress: &mut *progress, interrupt: &interrupt };
-        let mut outcome = pipeline::slice(&request, &mut text, watch)?;
+        let mut outcome = pipeline::slice(&request, &mut text, watch)
+            .map_err(|failure| about_model(failure, &arguments.model))?;
         outcome.warnings.extend(calibration::warning(&job.printer));
         text.flush().map_err(|error| output::failed(&target, &error))?;
         outcome
@@ -92,13 +94,18 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
 }
 
 /// Where the program goes: `MODEL.gcode` in the working folder unless the user says.
-fn target(arguments: &Slice) -> PathBuf {
+pub(super) fn target(arguments: &Slice) -> PathBuf {
     arguments.output.clone().unwrap_or_else(|| {
         let stem = arguments.model.file_stem().filter(|_| arguments.model != Path::new("-"));
         let mut name = stem.unwrap_or("model".as_ref()).to_owned();
         name.push(".gcode");
         PathBuf::from(name)
     })
+}
+
+/// What is wrong with a model names it; other failures name what they are about.
+fn about_model(failure: Failure, model: &Path) -> Failure {
+    if matches!(failure.exit_status(), 4 | 5 | 8) { failure.about(model) } else { failure }
 }
 
 fn fill(mut file: Output, bytes: &[u8]) -> Result<(), Failure> {

@@ -4,8 +4,6 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use machine::gcode::dialect::Space;
-use mesh::health::solid_from_soup;
-use mesh::stl;
 use twin::form::FormError;
 use twin::motor::lag::{Lag, Worst};
 use twin::thorough::Thorough;
@@ -211,9 +209,6 @@ fn setting_at_end(program: &[u8], name: &str) -> Option<String> {
 /// Reads a mesh that was sliced.
 pub(super) fn part(path: &Path) -> Result<mesh::mesh::Mesh, Failure> {
     let bytes = input::read(path)?;
-    let (soup, _) =
-        stl::read(&bytes).map_err(|error| Failure::new(error.class(), error.to_string()))?;
-    let (solid, _) =
-        solid_from_soup(&soup).map_err(|error| Failure::new(error.class(), error.to_string()))?;
+    let (solid, _) = super::solid(path, &bytes, 1.0)?;
     Ok(solid.into_mesh())
 }

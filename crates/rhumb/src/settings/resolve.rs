@@ -71,11 +71,17 @@ pub struct Job {
     pub drives: Drives,
     /// What turns the bed, for its lag.
     pub bed_drive: BedDrive,
+    /// Most cuts of a facet by a layer; not a setting of the print, but of how long to work for it.
+    pub most_cuts: f64,
     /// Program before the print.
     pub start: Vec<String>,
     /// Program after the print.
     pub end: Vec<String>,
 }
+
+/// Most cuts of a facet by a layer unless the user says: minutes of work. A detailed scan of a million
+/// facets has a hundredth of it.
+pub const MOST_CUTS: f64 = 1e9;
 
 impl Job {
     /// Checks settings against each other and returns the parameters of all stages.
@@ -126,6 +132,7 @@ impl Job {
                 gear_ratio: get.number("bed_gear_ratio"),
                 inertia: get.number("bed_inertia_kg_m2"),
             },
+            most_cuts: MOST_CUTS,
             start: template::fill(get.text("start_gcode"), "start_gcode", settings)?,
             end: template::fill(get.text("end_gcode"), "end_gcode", settings)?,
             printer,
