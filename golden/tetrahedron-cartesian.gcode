@@ -655,7 +655,7 @@ M140 S0
 M107
 M84
 ; estimated printing time (normal mode) = 22s
-; filament used [mm] = 5.08465
+; filament used [mm] = 5.08
 ; filament used [cm3] = 0.01
 ; filament used [g] = 0.02
 ; total filament used [g] = 0.02
@@ -677,6 +677,7 @@ M84
 ; max_print_height = 200
 ; machine_max_feedrate_z = 15
 ; machine_max_acceleration_z = 300
+; machine_max_feedrate_e = 120
 ; machine_max_acceleration_extruding = 1500
 ; home_rail = 120
 ; home_z = 5
@@ -687,8 +688,6 @@ M84
 ; nozzle_half_angle = 15
 ; nozzle_block_height = 30
 ; nozzle_block_radius = 20
-; carriage_height = 60
-; carriage_width = 60
 ; min_layer_height = 0.04
 ; max_layer_height = 0.32
 ; max_nozzle_temperature = 280

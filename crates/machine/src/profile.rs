@@ -20,8 +20,8 @@ pub struct Printer {
     pub rail_jerk: f64,
     /// The same for the bed, rad/s.
     pub bed_jerk: f64,
-    /// Filament speed for moves of the filament alone, mm/s.
-    pub filament_speed: f64,
+    /// Greatest speed of the filament, fed or drawn back, mm/s.
+    pub extruder_speed: f64,
     /// The bore of the nozzle, mm.
     pub nozzle_diameter: f64,
     /// What of the hot end may run into the print.

@@ -7,6 +7,10 @@
 //! much as along curves, so a program in which every move simply runs at its `F` asks nothing
 //! impossible of the bed, whatever the firmware knows of it.
 //!
+//! The axes are carriage, bed and lift, and the nozzle along its path over the part. Of the nozzle
+//! only the speed counts, not where it turns to: what must be turned round is carriage and bed. The
+//! extruder has a speed alone; filament is as light as its gear is strong.
+//!
 //! Method: durations start at the speed limits and are lengthened, to and fro along the layer, until
 //! the rule holds everywhere; of two moves the one that is faster in the violated axis gives way.
 //! Durations only ever grow, and doubling both of a pair quarters what it violates, so this ends.
@@ -19,9 +23,10 @@ use crate::resample::Leg;
 /// What the speed of a program must respect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Rail and bed: greatest speed and acceleration, in mm and radians.
-    axes: [AxisLimit; 2],
-    lift_speed: f64,
+    /// Greatest speed and acceleration, in mm and radians.
+    axes: [AxisLimit; AXES],
+    /// mm of filament a second, either way.
+    extruder_speed: f64,
     least_duration: f64,
     /// Whether rail and bed are driven by this program at all.
     polar: bool,
@@ -34,6 +39,18 @@ struct AxisLimit {
     speed: f64,
     acceleration: f64,
 }
+
+/// Carriage, bed, lift, and the nozzle along its path.
+const AXES: usize = 4;
+
+/// The carriage among the axes.
+const RAIL: usize = 0;
+
+/// The bed.
+const BED: usize = 1;
+
+/// The lift.
+const LIFT: usize = 2;
 
 /// Share of a limit that is used. Positions are rounded before they come here; what is left is the
 /// rounding of `F`, and readers who measure an arc by its chord.
@@ -51,10 +68,10 @@ const MOST_PASSES: usize = 200;
 /// [`USED_SHARE`].
 const SLACK: f64 = 1e-3;
 
-/// The speed of rail and bed in a move, and how long it lasts: what the next move joins on to.
+/// The speeds of the axes in a move, and how long it lasts: what the next move joins on to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
-    speeds: [f64; 2],
+    speeds: [f64; AXES],
     duration: f64,
     /// The way that the bed turned last: 1 or −1.
     direction: f64,
@@ -62,12 +79,12 @@ pub struct Pace {
 
 impl Pace {
     /// Standing still, for as long as one likes.
-    pub const REST: Self = Self { speeds: [0.0, 0.0], duration: 0.0, direction: 1.0 };
+    pub const REST: Self = Self { speeds: [0.0; AXES], duration: 0.0, direction: 1.0 };
 }
 
 impl Limits {
     /// Returns the limits of a printer for moves that are straight in `space`; over the part, only
-    /// lift and command rate count.
+    /// the speeds of lift and extruder and the command rate count.
     #[must_use]
     pub fn of(printer: &Printer, space: Space) -> Self {
         let share = if space == Space::IdealPlane { USED_SHARE_UNEVEN } else { USED_SHARE };
@@ -79,8 +96,17 @@ impl Limits {
             axes: [
                 limit(printer.rail.speed, printer.rail.acceleration),
                 limit(printer.bed.speed, printer.bed.acceleration),
+                AxisLimit {
+                    speed: printer.lift.speed * USED_SHARE,
+                    acceleration: printer.lift.acceleration * USED_SHARE,
+                },
+                // How fast the nozzle is to be is said with each leg.
+                AxisLimit {
+                    speed: f64::INFINITY,
+                    acceleration: printer.path_acceleration * USED_SHARE,
+                },
             ],
-            lift_speed: printer.lift.speed * USED_SHARE,
+            extruder_speed: printer.extruder_speed * USED_SHARE,
             least_duration: 1.0 / printer.moves_per_second,
             polar: space != Space::Part,
             stops_to_turn_back: space != Space::Part && printer.alignment.bed.backlash > 0.0,
@@ -112,6 +138,11 @@ pub(crate) fn travels(legs: &[Leg], start: machine::program::Joints) -> Vec<Trav
         .collect()
 }
 
+/// What the axes of the law do in a leg.
+fn distances(leg: &Leg, travel: &Travel) -> [f64; AXES] {
+    [travel.axes[0], travel.axes[1], travel.lift, leg.path]
+}
+
 /// Returns the duration of every leg, s, and the pace of the last.
 #[must_use]
 pub(crate) fn durations(
@@ -120,18 +151,20 @@ pub(crate) fn durations(
     before: Pace,
     limits: &Limits,
 ) -> (Vec<f64>, Pace) {
+    let moves: Vec<[f64; AXES]> =
+        legs.iter().zip(travels).map(|(leg, travel)| distances(leg, travel)).collect();
     let mut durations: Vec<f64> =
-        legs.iter().zip(travels).map(|(leg, travel)| at_speed(leg, travel, limits)).collect();
+        legs.iter().zip(&moves).map(|(leg, axes)| at_speed(leg, axes, limits)).collect();
     let mut direction = before.direction;
     if limits.stops_to_turn_back {
-        direction = stop_to_turn_back(&mut durations, travels, direction, limits);
+        direction = stop_to_turn_back(&mut durations, &moves, direction, limits);
     }
     if limits.polar {
-        keep_accelerations(&mut durations, travels, before, limits);
+        keep_accelerations(&mut durations, &moves, before, limits);
     }
-    let last = match (travels.last(), durations.last()) {
-        (Some(travel), Some(&duration)) => {
-            let speeds = travel.axes.map(|distance| distance / duration);
+    let last = match (moves.last(), durations.last()) {
+        (Some(axes), Some(&duration)) => {
+            let speeds = axes.map(|distance| distance / duration);
             Pace { speeds, duration, direction }
         }
         _ => before,
@@ -140,13 +173,13 @@ pub(crate) fn durations(
 }
 
 /// The least duration in which no axis exceeds its speed.
-fn at_speed(leg: &Leg, travel: &Travel, limits: &Limits) -> f64 {
-    let distance = if leg.path > 0.0 { leg.path } else { leg.filament.abs() };
-    let mut duration = (distance / leg.speed).max(travel.lift.abs() / limits.lift_speed);
+fn at_speed(leg: &Leg, axes: &[f64; AXES], limits: &Limits) -> f64 {
+    let fed = leg.filament.abs();
+    let distance = if leg.path > 0.0 { leg.path } else { fed };
+    let of_axis = |k: usize| axes[k].abs() / limits.axes[k].speed;
+    let mut duration = (distance / leg.speed).max(fed / limits.extruder_speed).max(of_axis(LIFT));
     if limits.polar {
-        for (distance, limit) in travel.axes.iter().zip(&limits.axes) {
-            duration = duration.max(distance.abs() / limit.speed);
-        }
+        duration = duration.max(of_axis(RAIL)).max(of_axis(BED));
     }
     duration.max(limits.least_duration)
 }
@@ -156,48 +189,48 @@ fn at_speed(leg: &Leg, travel: &Travel, limits: &Limits) -> f64 {
 /// in which nothing else moves.
 fn stop_to_turn_back(
     durations: &mut [f64],
-    travels: &[Travel],
+    moves: &[[f64; AXES]],
     before: f64,
     limits: &Limits,
 ) -> f64 {
     let mut direction = before;
     for i in 0..durations.len() {
-        if travels[i].axes[1] * direction >= 0.0 {
+        if moves[i][BED] * direction >= 0.0 {
             continue;
         }
         direction = -direction;
         // The last move of a run ends at rest anyhow.
         for k in i.saturating_sub(1)..=i {
-            durations[k] = durations[k].max(from_rest(&travels[k], limits));
+            durations[k] = durations[k].max(from_rest(&moves[k], limits));
         }
     }
     direction
 }
 
 /// The least duration of a move that begins or ends at rest.
-fn from_rest(travel: &Travel, limits: &Limits) -> f64 {
-    let needed = |k: usize| slowed(travel.axes[k], 0.0, 0.0, limits.axes[k].acceleration);
-    needed(0).max(needed(1))
+fn from_rest(axes: &[f64; AXES], limits: &Limits) -> f64 {
+    let needed = |k: usize| slowed(axes[k], 0.0, 0.0, limits.axes[k].acceleration);
+    (0..AXES).map(needed).fold(0.0, f64::max)
 }
 
-fn keep_accelerations(durations: &mut [f64], travels: &[Travel], before: Pace, limits: &Limits) {
+fn keep_accelerations(durations: &mut [f64], moves: &[[f64; AXES]], before: Pace, limits: &Limits) {
     // Pairs of neighbours of which one changed since they were found to agree; most never change.
     let mut open = vec![true; durations.len().saturating_sub(1)];
     for _ in 0..MOST_PASSES {
-        let mut changed = join_on(before, durations, travels, limits);
+        let mut changed = join_on(before, durations, moves, limits);
         if let Some(first) = open.first_mut().filter(|_| changed) {
             *first = true;
         }
         for i in 0..open.len() {
-            changed |= look_again(i, &mut open, durations, travels, limits);
+            changed |= look_again(i, &mut open, durations, moves, limits);
         }
-        let rests = come_to_rest(durations, travels, limits);
+        let rests = come_to_rest(durations, moves, limits);
         if let Some(last) = open.last_mut().filter(|_| rests) {
             *last = true;
         }
         changed |= rests;
         for i in (0..open.len()).rev() {
-            changed |= look_again(i, &mut open, durations, travels, limits);
+            changed |= look_again(i, &mut open, durations, moves, limits);
         }
         if !changed {
             return;
@@ -210,13 +243,13 @@ fn look_again(
     i: usize,
     open: &mut [bool],
     durations: &mut [f64],
-    travels: &[Travel],
+    moves: &[[f64; AXES]],
     limits: &Limits,
 ) -> bool {
     if !open[i] {
         return false;
     }
-    let changed = agree(i, durations, travels, limits);
+    let changed = agree(i, durations, moves, limits);
     open[i] = changed;
     if changed {
         let neighbours = i.saturating_sub(1)..=(i + 1).min(open.len() - 1);
@@ -226,22 +259,22 @@ fn look_again(
 }
 
 /// Makes the first move agree with what ran before it, which can no longer change.
-fn join_on(before: Pace, durations: &mut [f64], travels: &[Travel], limits: &Limits) -> bool {
-    let (Some(duration), Some(travel)) = (durations.first_mut(), travels.first()) else {
+fn join_on(before: Pace, durations: &mut [f64], moves: &[[f64; AXES]], limits: &Limits) -> bool {
+    let (Some(duration), Some(axes)) = (durations.first_mut(), moves.first()) else {
         return false;
     };
     let mut changed = false;
-    for k in 0..2 {
+    for (k, &distance) in axes.iter().enumerate() {
         let acceleration = limits.axes[k].acceleration;
         let excess = |duration: f64| {
             let between = f64::midpoint(before.duration, duration);
-            (travel.axes[k] / duration - before.speeds[k]).abs() / (between * acceleration)
+            (distance / duration - before.speeds[k]).abs() / (between * acceleration)
         };
         if excess(*duration) <= 1.0 + SLACK {
             continue;
         }
         *duration =
-            slowed(travel.axes[k], before.speeds[k], before.duration, acceleration).max(*duration);
+            slowed(distance, before.speeds[k], before.duration, acceleration).max(*duration);
         // Where the earlier move turned the other way or faster, only time helps.
         while excess(*duration) > 1.0 + SLACK {
             *duration *= 1.1;
@@ -253,22 +286,22 @@ fn join_on(before: Pace, durations: &mut [f64], travels: &[Travel], limits: &Lim
 
 /// Makes the last move slow enough to be followed by anything: what comes next, often a retraction
 /// that should be fast, can then keep its speed.
-fn come_to_rest(durations: &mut [f64], travels: &[Travel], limits: &Limits) -> bool {
-    let (Some(duration), Some(travel)) = (durations.last_mut(), travels.last()) else {
+fn come_to_rest(durations: &mut [f64], moves: &[[f64; AXES]], limits: &Limits) -> bool {
+    let (Some(duration), Some(axes)) = (durations.last_mut(), moves.last()) else {
         return false;
     };
-    let needed = from_rest(travel, limits);
+    let needed = from_rest(axes, limits);
     let changed = needed > *duration * (1.0 + SLACK);
     *duration = duration.max(needed);
     changed
 }
 
 /// Makes moves `i` and `i + 1` agree; returns whether anything changed.
-fn agree(i: usize, durations: &mut [f64], travels: &[Travel], limits: &Limits) -> bool {
+fn agree(i: usize, durations: &mut [f64], moves: &[[f64; AXES]], limits: &Limits) -> bool {
     let mut changed = false;
-    for k in 0..2 {
-        let acceleration = limits.axes[k].acceleration;
-        let distances = [travels[i].axes[k], travels[i + 1].axes[k]];
+    for (k, limit) in limits.axes.iter().enumerate() {
+        let acceleration = limit.acceleration;
+        let distances = [moves[i][k], moves[i + 1][k]];
         let between = f64::midpoint(durations[i], durations[i + 1]);
         // Both sides of `change of speed <= acceleration * time`, times both durations.
         let change = (distances[1] * durations[i] - distances[0] * durations[i + 1]).abs();
@@ -339,16 +372,20 @@ mod tests {
         (legs, travels, durations)
     }
 
-    fn check(travels: &[Travel], durations: &[f64]) {
+    fn check(legs: &[Leg], travels: &[Travel], durations: &[f64]) {
         let printer = printer();
         let limits = [
             (printer.rail.speed, printer.rail.acceleration),
             (printer.bed.speed, printer.bed.acceleration),
+            (printer.lift.speed, printer.lift.acceleration),
+            (f64::INFINITY, printer.path_acceleration),
         ];
+        let moves: Vec<[f64; 4]> =
+            legs.iter().zip(travels).map(|(leg, travel)| distances(leg, travel)).collect();
         for (k, (speed, acceleration)) in limits.into_iter().enumerate() {
             let mut before = (0.0, 0.0);
-            for (travel, &duration) in travels.iter().zip(durations) {
-                let now = travel.axes[k] / duration;
+            for (axes, &duration) in moves.iter().zip(durations) {
+                let now = axes[k] / duration;
                 assert!(now.abs() <= speed, "axis {k}: {now} > {speed}");
                 let change = (now - before.0).abs() / f64::midpoint(before.1, duration);
                 assert!(change <= acceleration, "axis {k}: {change} > {acceleration}");
@@ -371,8 +408,8 @@ mod tests {
             .collect();
         for points in [star, zigzag, vec![[-40.0, 0.1], [40.0, 0.1]], vec![[-9.0, 0.0], [9.0, 0.0]]]
         {
-            let (_, travels, durations) = planned(&points, 100.0);
-            check(&travels, &durations);
+            let (legs, travels, durations) = planned(&points, 100.0);
+            check(&legs, &travels, &durations);
         }
     }
 
@@ -386,7 +423,7 @@ mod tests {
         printer.alignment.bed.backlash = 0.001;
         let limits = Limits::of(&printer, Space::Joints);
         let (durations, last) = durations(&legs, &travels, Pace::REST, &limits);
-        check(&travels, &durations);
+        check(&legs, &travels, &durations);
         let (mut direction, mut reversals) = (1.0, 0);
         for i in 0..travels.len() {
             if travels[i].axes[1] * direction < 0.0 {
@@ -400,6 +437,56 @@ mod tests {
             }
         }
         assert!(reversals > 15 && last.direction == direction);
+    }
+
+    /// Legs along the rail, by their way, lift and filament, with what they last.
+    fn along_the_rail(legs: &[[f64; 3]], speed: f64) -> (Vec<Leg>, Vec<Travel>, Vec<f64>) {
+        use machine::program::{BedTurn, Joints};
+        let mut to = Joints { s: 20.0, turn: BedTurn::default(), z: 1.0 };
+        let start = to;
+        let legs: Vec<Leg> = legs
+            .iter()
+            .map(|&[way, lift, filament]| {
+                to = Joints { s: to.s + way, z: to.z + lift, ..to };
+                let path = way.hypot(lift);
+                let kind = if path > 0.0 { Kind::Print } else { Kind::Filament };
+                Leg { kind, to, at: Point3::new(to.s, 0.0, to.z), filament, path, speed }
+            })
+            .collect();
+        let travels = travels(&legs, start);
+        let limits = Limits::of(&printer(), Space::Joints);
+        let (durations, _) = durations(&legs, &travels, Pace::REST, &limits);
+        (legs, travels, durations)
+    }
+
+    #[test]
+    fn the_lift_is_sped_up_and_braked_as_it_can_be() {
+        let hop = vec![[0.0, 0.2, 0.0], [30.0, 0.0, 0.0], [0.0, -0.2, 0.0]];
+        let waves = (0..60).map(|i| [1.0, 0.3 * f64::from(i % 3 - 1), 0.03]).collect();
+        for ways in [hop, waves] {
+            let (legs, travels, durations) = along_the_rail(&ways, 100.0);
+            check(&legs, &travels, &durations);
+        }
+    }
+
+    #[test]
+    fn the_nozzle_is_sped_up_and_braked_at_the_ends_of_a_line_only() {
+        let ways = vec![[0.5, 0.0, 0.02]; 100];
+        let (legs, travels, durations) = along_the_rail(&ways, 60.0);
+        check(&legs, &travels, &durations);
+        // 60 mm/s are reached within 1.2 mm.
+        assert!(durations[5..95].iter().all(|duration| (duration - 0.5 / 60.0).abs() < 1e-9));
+        assert!(durations[0] > 1.5 * durations[5] && durations[99] > 1.5 * durations[5]);
+    }
+
+    #[test]
+    fn filament_is_fed_no_faster_than_its_gear_turns() {
+        let printer = printer();
+        let (_, _, durations) = along_the_rail(&[[0.0, 0.0, -3.0], [0.5, 0.0, 30.0]], 200.0);
+        for (fed, duration) in [3.0, 30.0].iter().zip(&durations) {
+            let speed = fed / duration;
+            assert!(speed <= printer.extruder_speed && speed > 0.98 * printer.extruder_speed);
+        }
     }
 
     #[test]

@@ -47,7 +47,7 @@ fn printer(alignment: Alignment, at: Point3<f64>) -> Printer {
         path_acceleration: 1500.0,
         rail_jerk: 8.0,
         bed_jerk: 0.5,
-        filament_speed: 50.0,
+        extruder_speed: 120.0,
         nozzle_diameter: 0.4,
         nozzle: machine::profile::NozzleShape::COMMON,
         axis_clearance: 0.02,

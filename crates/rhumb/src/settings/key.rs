@@ -362,6 +362,13 @@ pub const KEYS: &[Key] = &[
     ),
     number(
         Printer,
+        "extruder_speed_mm_per_s",
+        "machine_max_feedrate_e",
+        (120.0, 1.0, 1000.0),
+        "greatest speed of the filament, whether fed or drawn back",
+    ),
+    number(
+        Printer,
         "path_acceleration_mm_per_s2",
         "machine_max_acceleration_extruding",
         (1500.0, 1.0, 100_000.0),

@@ -176,7 +176,7 @@ fn printer(get: &Lookup<'_>) -> Printer {
         path_acceleration: get.number("path_acceleration_mm_per_s2"),
         rail_jerk: get.number("rail_jerk_mm_per_s"),
         bed_jerk: get.number("bed_jerk_deg_per_s").to_radians(),
-        filament_speed: get.number("retract_speed_mm_per_s"),
+        extruder_speed: get.number("extruder_speed_mm_per_s"),
         nozzle_diameter: get.number("nozzle_diameter_mm"),
         nozzle: NozzleShape {
             flat_radius: get.number("nozzle_flat_radius_mm"),

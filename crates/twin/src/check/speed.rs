@@ -1,6 +1,6 @@
 //! Does no axis run faster than it can?
 //!
-//! Mean speed of bed, carriage and lift over every segment, at the commanded `F`. Allowed on top
+//! Mean speed of bed, carriage, lift and filament over every segment, at the commanded `F`. Allowed on top
 //! of the limit is what the [rounding](crate::rounding) of the text can do to that mean.
 
 use machine::profile::Printer;
@@ -12,12 +12,16 @@ use crate::segment::Segment;
 /// The name of this check.
 pub const NAME: &str = "speed";
 
+/// The last place of a word of filament, mm.
+const FILAMENT: f64 = 1e-5;
+
 /// Judges mean speeds, and remembers the greatest.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Speed {
     bed: f64,
     rail: f64,
     lift: f64,
+    extruder: f64,
     greatest_bed: f64,
     greatest_rail: f64,
 }
@@ -27,7 +31,8 @@ impl Speed {
     #[must_use]
     pub(crate) fn new(printer: &Printer) -> Self {
         let (bed, rail, lift) = (printer.bed.speed, printer.rail.speed, printer.lift.speed);
-        Self { bed, rail, lift, greatest_bed: 0.0, greatest_rail: 0.0 }
+        let extruder = printer.extruder_speed;
+        Self { bed, rail, lift, extruder, greatest_bed: 0.0, greatest_rail: 0.0 }
     }
 
     pub(crate) fn segment(&mut self, segment: &Segment, doubt: &Doubt, findings: &mut Findings) {
@@ -48,6 +53,7 @@ impl Speed {
         let bed = judge("the bed", (segment.bed_change(), doubt.turn), self.bed, "rad/s");
         let rail = judge("the carriage", (segment.rail_change(), doubt.rail), self.rail, "mm/s");
         judge("the lift", (segment.lift_change(), doubt.lift), self.lift, "mm/s");
+        judge("the filament", (segment.filament, FILAMENT), self.extruder, "mm/s");
         self.greatest_bed = self.greatest_bed.max(bed);
         self.greatest_rail = self.greatest_rail.max(rail);
     }
@@ -68,7 +74,7 @@ impl Speed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sample::{joints, polar_segment, printer, segment};
+    use crate::sample::{filament_segment, joints, polar_segment, printer, segment};
 
     fn found(segment: &Segment) -> Vec<f64> {
         let mut findings = Findings::default();
@@ -86,6 +92,20 @@ mod tests {
         let lift = |feed| segment(joints(20.0, 0.0, 0.2), joints(20.0, 0.0, 1.2), feed);
         assert_eq!(found(&lift(10.0)), []);
         assert_eq!(found(&lift(10.1)), [10.0]);
+    }
+
+    #[test]
+    fn filament_is_pushed_and_pulled_no_faster_than_its_gear_turns() {
+        let limit = printer().extruder_speed;
+        assert_eq!(found(&filament_segment(2.0, limit)), []);
+        assert_eq!(found(&filament_segment(2.0, 1.01 * limit)), [limit]);
+        assert_eq!(found(&filament_segment(-2.0, 1.01 * limit)), [limit]);
+        // Along a line as well: 10 mm in a tenth of a second, with more filament than way.
+        let mut line = polar_segment([20.0, 0.0], [30.0, 0.0], 100.0);
+        line.filament = 0.1 * limit;
+        assert_eq!(found(&line), []);
+        line.filament *= 1.01;
+        assert_eq!(found(&line), [limit]);
     }
 
     #[test]
