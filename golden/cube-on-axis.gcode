@@ -692,6 +692,7 @@ M84
 ; first_layer_bed_temperature = 60
 ; extrusion_multiplier = 1
 ; filament_max_volumetric_speed = 11
+; filament_min_volumetric_speed = 0.1
 ; retract_length = 0.8
 ; retract_speed = 35
 ; retract_before_travel = 2

@@ -12,9 +12,14 @@ pub struct CoolingParams {
     pub least_speed: f64,
 }
 
-/// Lowers the wanted speed of a layer's extruding legs so that it takes the least layer time;
-/// returns whether anything changed.
-pub fn slow_down(legs: &mut [Leg], durations: &[f64], params: &CoolingParams) -> bool {
+/// Lowers the wanted speed of a layer's extruding legs so that it takes the least layer time, but none
+/// so far that it feeds less filament than `least_feed`, mm/s; returns whether anything changed.
+pub fn slow_down(
+    legs: &mut [Leg],
+    durations: &[f64],
+    params: &CoolingParams,
+    least_feed: f64,
+) -> bool {
     let of_kind = |print: bool| -> f64 {
         legs.iter()
             .zip(durations)
@@ -30,7 +35,8 @@ pub fn slow_down(legs: &mut [Leg], durations: &[f64], params: &CoolingParams) ->
     for (leg, duration) in legs.iter_mut().zip(durations) {
         if leg.kind == Kind::Print {
             let speed = leg.path / duration;
-            leg.speed = (speed / stretch).max(params.least_speed.min(speed));
+            let flows = if leg.filament > 0.0 { least_feed * leg.path / leg.filament } else { 0.0 };
+            leg.speed = (speed / stretch).max(params.least_speed.max(flows).min(speed));
         }
     }
     true
@@ -58,14 +64,19 @@ mod tests {
     fn short_layers_last_longer_and_long_ones_do_not() {
         let mut stretched = legs();
         let params = CoolingParams { least_layer_time: 6.0, least_speed: 10.0 };
-        assert!(slow_down(&mut stretched, &[1.0, 2.0], &params));
+        assert!(slow_down(&mut stretched, &[1.0, 2.0], &params, 0.0));
         assert!((stretched[1].speed - 20.0).abs() < 1e-12, "5 s are left for 100 mm");
         assert_eq!(stretched[0].speed, 50.0, "travel stays fast");
         let enough = CoolingParams { least_layer_time: 3.0, ..params };
-        assert!(!slow_down(&mut legs(), &[1.0, 2.0], &enough));
+        assert!(!slow_down(&mut legs(), &[1.0, 2.0], &enough, 0.0));
         let forever = CoolingParams { least_layer_time: 60.0, ..params };
         let mut slowest = legs();
-        slow_down(&mut slowest, &[1.0, 2.0], &forever);
+        slow_down(&mut slowest, &[1.0, 2.0], &forever, 0.0);
         assert_eq!(slowest[1].speed, 10.0);
+        // 4 mm of filament on 100 mm: at 25 mm/s that is a millimetre a second.
+        let mut flowing = legs();
+        flowing[1].filament = 4.0;
+        slow_down(&mut flowing, &[1.0, 2.0], &forever, 1.0);
+        assert_eq!(flowing[1].speed, 25.0);
     }
 }

@@ -18,6 +18,7 @@ pub mod printed;
 pub mod resample;
 pub mod route;
 pub mod seam;
+pub mod slow_flow;
 pub mod speed;
 pub mod time;
 mod winding;

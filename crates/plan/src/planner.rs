@@ -12,6 +12,7 @@ use crate::printed::Printed;
 use crate::resample::{Leg, ResampleParams, Resampler};
 use crate::route::{FilamentParams, Item, Kind, Router, Speeds, Stroke};
 use crate::seam::SeamMemory;
+use crate::slow_flow::{FlowWatch, SlowFlow};
 use crate::speed::{Limits, Pace, durations, travels};
 use crate::time;
 
@@ -64,6 +65,8 @@ pub struct Totals {
     pub retractions: usize,
     /// Turns of the bed, whichever way.
     pub bed_turns: f64,
+    /// What was laid with less flow than is good.
+    pub slow_flow: SlowFlow,
 }
 
 impl Totals {
@@ -102,6 +105,7 @@ pub struct Planner<'a> {
     seams: SeamMemory,
     pace: Pace,
     totals: Totals,
+    flow: FlowWatch,
     role: Role,
 }
 
@@ -121,6 +125,7 @@ impl<'a> Planner<'a> {
             seams: SeamMemory::default(),
             pace: Pace::REST,
             totals: Totals::default(),
+            flow: FlowWatch::new(params.filament.least_flow, params.filament.area),
             role: Role::Custom,
         }
     }
@@ -171,7 +176,7 @@ impl<'a> Planner<'a> {
             let leg = Leg { kind: Kind::Travel, to, at, filament: 0.0, path, speed };
             steps.extend(self.timed(vec![vec![leg]], from).into_iter().flatten());
         }
-        Ok((steps, self.totals))
+        Ok((steps, Totals { slow_flow: self.flow.found(), ..self.totals }))
     }
 
     fn heat(&self, index: usize) -> Vec<Step> {
@@ -244,7 +249,8 @@ impl<'a> Planner<'a> {
         let mut legs: Vec<Leg> = groups.into_iter().flatten().collect();
         let travels = travels(&legs, start);
         let (mut times, mut pace) = durations(&legs, &travels, self.pace, &self.limits);
-        if slow_down(&mut legs, &times, &self.params.cooling) {
+        let least_feed = self.params.filament.least_flow / self.params.filament.area;
+        if slow_down(&mut legs, &times, &self.params.cooling, least_feed) {
             (times, pace) = durations(&legs, &travels, self.pace, &self.limits);
         }
         self.pace = pace;
@@ -259,13 +265,10 @@ impl<'a> Planner<'a> {
             self.count(leg, travel.axes[1]);
         }
         let mut timed = legs.iter().zip(times).map(|(leg, duration)| {
-            Step::Move(Move {
-                to: leg.to,
-                at: leg.at,
-                filament: leg.filament,
-                path: leg.path,
-                duration,
-            })
+            let motion =
+                Move { to: leg.to, at: leg.at, filament: leg.filament, path: leg.path, duration };
+            self.flow.look(&motion);
+            Step::Move(motion)
         });
         sizes.iter().map(|&size| timed.by_ref().take(size).collect()).collect()
     }

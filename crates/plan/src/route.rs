@@ -57,6 +57,8 @@ pub struct FilamentParams {
     pub multiplier: f64,
     /// Most volume that melts, mm³/s.
     pub volume_per_second: f64,
+    /// The least volume in a second without oozing and cooking, mm³/s.
+    pub least_flow: f64,
     /// Filament drawn back before a travel, mm; 0 for never.
     pub retract_length: f64,
     /// Speed of drawing back and feeding again, mm/s.
@@ -415,6 +417,7 @@ mod tests {
         area: 2.405_281_875,
         multiplier: 1.0,
         volume_per_second: 11.0,
+        least_flow: 0.1,
         retract_length: 0.8,
         retract_speed: 35.0,
         retract_before_travel: 2.0,

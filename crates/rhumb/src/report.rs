@@ -155,6 +155,68 @@ pub struct Print {
     pub retractions: usize,
     /// Turns of the bed, whichever way.
     pub bed_turns: f64,
+    /// Beads with less flow than the filament should have, mostly near the axis; absent when there
+    /// are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slow_flow: Option<SlowFlow>,
+}
+
+/// Beads with less flow than the filament should have.
+#[derive(Debug, Clone, Serialize)]
+pub struct SlowFlow {
+    /// The flow that they are below.
+    pub limit_mm3_per_s: f64,
+    /// In how many places.
+    pub places: usize,
+    /// How long in all.
+    pub time_s: f64,
+    /// What length of beads.
+    pub length_mm: f64,
+    /// The least flow.
+    pub least_mm3_per_s: f64,
+    /// Where that is, part frame.
+    pub at_mm: [f64; 3],
+    /// Its distance from the rotation axis.
+    pub from_axis_mm: f64,
+}
+
+/// A number without the noise of its last bits.
+pub(crate) fn tidy(number: f64) -> f64 {
+    (number * 1e6).round() / 1e6
+}
+
+impl SlowFlow {
+    /// Returns what was found below a limit, if anything was.
+    #[must_use]
+    pub fn of(found: &plan::slow_flow::SlowFlow, limit: f64) -> Option<Self> {
+        let at = &found.at;
+        (found.places > 0).then(|| Self {
+            limit_mm3_per_s: limit,
+            places: found.places,
+            time_s: tidy(found.time),
+            length_mm: tidy(found.length),
+            least_mm3_per_s: tidy(found.least),
+            at_mm: [tidy(at.x), tidy(at.y), tidy(at.z)],
+            from_axis_mm: tidy(at.x.hypot(at.y)),
+        })
+    }
+}
+
+impl std::fmt::Display for SlowFlow {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "below {} mm³/s in {} places, {:.1} mm of beads in {:.1} s; least {:.3} mm³/s at z {:.2} mm, \
+             {:.2} mm from the axis",
+            self.limit_mm3_per_s,
+            self.places,
+            self.length_mm,
+            self.time_s,
+            self.least_mm3_per_s,
+            self.at_mm[2],
+            self.from_axis_mm
+        )
+    }
 }
 
 /// What the check found.

@@ -12,7 +12,7 @@ use crate::place::volume;
 use crate::program_text::duration;
 use crate::report::{
     FloatingIsland, Layers, MeshHealth, Model, Orientation, OrientationCandidate, Print, Report,
-    Verify,
+    SlowFlow, Verify, tidy,
 };
 use crate::settings::Job;
 use machine::gcode::decimal;
@@ -67,6 +67,7 @@ pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Jo
             moves: totals.moves,
             retractions: totals.retractions,
             bed_turns: totals.bed_turns,
+            slow_flow: SlowFlow::of(&totals.slow_flow, job.plan.filament.least_flow),
         },
         verify: Verify { findings: verdict.map(findings).unwrap_or_default() },
         timings_ms: outcome.timings.clone(),
@@ -81,11 +82,6 @@ fn floating(outcome: &Outcome) -> Vec<FloatingIsland> {
         area_mm2: tidy(island.area),
     });
     islands.collect()
-}
-
-/// A level without the noise of its last bits.
-fn tidy(length: f64) -> f64 {
-    (length * 1e6).round() / 1e6
 }
 
 fn orientation(outcome: &Outcome, job: &Job) -> Orientation {
@@ -165,6 +161,9 @@ pub fn text(
         ),
     );
     row("bed", format!("{} turns", decimal(report.print.bed_turns, 0)));
+    if let Some(slow) = &report.print.slow_flow {
+        row("slow flow", slow.to_string());
+    }
     for warning in &report.warnings {
         row("note", format!("{} [{}]", warning.message, warning.code));
     }

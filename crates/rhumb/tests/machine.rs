@@ -6,6 +6,7 @@ use machine::program::Role;
 use mesh::mesh::Mesh;
 use mesh::shapes;
 use nalgebra::{Point2, Vector2};
+use plan::planner::Totals;
 use rhumb::check::check;
 use rhumb::interrupt::Interrupt;
 use rhumb::pipeline::{Request, Watch, part, slice};
@@ -29,6 +30,11 @@ fn job(printer: &str, set: &[&str]) -> (Settings, Job) {
 
 /// Slices a mesh, and has the program judged by the machine that it was made for.
 fn program(mesh: &Mesh, settings: &Settings, job: &Job) -> Vec<u8> {
+    sliced(mesh, settings, job).0
+}
+
+/// The same with what the slice amounts to.
+fn sliced(mesh: &Mesh, settings: &Settings, job: &Job) -> (Vec<u8>, Totals) {
     let model = mesh::stl::write(mesh);
     let request = Request {
         model: &model,
@@ -45,7 +51,7 @@ fn program(mesh: &Mesh, settings: &Settings, job: &Job) -> Vec<u8> {
     let errors: Vec<_> =
         verdict.findings.iter().filter(|f| f.severity == Severity::Error).take(3).collect();
     assert!(errors.is_empty(), "{}: {errors:?}", job.dialect.name);
-    text
+    (text, outcome.totals)
 }
 
 /// Places of the nozzle in the part, a few on each extruding move of the outer wall, as a machine
@@ -219,4 +225,41 @@ fn a_probed_bed_and_a_loose_drive_print_the_same_part() {
         .filter_map(|line| line.split(" Z").nth(1)?.split(' ').next()?.parse().ok())
         .collect();
     assert!(raised > 0.05 && heights.len() > 100, "the lift follows the bed: {}", heights.len());
+}
+
+#[test]
+fn slow_flow_beside_the_axis_is_told_and_there_is_none_elsewhere() {
+    let disc: Vec<[f64; 2]> = (0..90)
+        .map(|k| (f64::from(k) * 4.0).to_radians())
+        .map(|angle| [8.0 * angle.cos(), 8.0 * angle.sin()])
+        .collect();
+    let hole: Vec<[f64; 2]> = disc.iter().map(|[x, y]| [x / 2.0, y / 2.0]).collect();
+    let (solid, ring) = (shapes::extruded(&disc, &[], 0.8), shapes::extruded(&disc, &[hole], 0.8));
+    let set = ["fill_density=1", "skirts=0"];
+    let (settings, mut job) = job("linuxcnc-rotary", &set);
+    let (text, totals) = sliced(&solid, &settings, &job);
+    let found = totals.slow_flow;
+    let limit = job.plan.filament.least_flow;
+    // At a quarter turn a second even a thick bead needs a millimetre's distance.
+    assert!(found.places > 0 && found.least < limit / 2.0, "{found:?}");
+    assert!(found.at.xy().coords.norm() < 1.0, "{found:?}");
+    // The program says the same: time and length of what is laid below the limit.
+    let (mut time, mut length, mut least) = (0.0, 0.0, f64::INFINITY);
+    check(text.as_slice(), &job, None, false, |segment| {
+        let flow = segment.filament * job.plan.filament.area / segment.duration;
+        if segment.extrudes() && flow < limit {
+            time += segment.duration;
+            length += segment.path;
+            least = flow.min(least);
+        }
+    })
+    .expect("memory");
+    assert!((found.time / time - 1.0).abs() < 0.02, "{} {time}", found.time);
+    assert!((found.length / length - 1.0).abs() < 0.02, "{} {length}", found.length);
+    assert!((found.least / least - 1.0).abs() < 0.02, "{} {least}", found.least);
+    let (_, totals) = sliced(&ring, &settings, &job);
+    assert_eq!(totals.slow_flow.places, 0, "{:?}", totals.slow_flow);
+    job.plan.filament.least_flow = 0.0;
+    let (_, totals) = sliced(&solid, &settings, &job);
+    assert_eq!(totals.slow_flow.places, 0);
 }

@@ -18,6 +18,7 @@ use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
 use crate::place::parse_centre;
 use crate::program_text::duration;
+use crate::report::SlowFlow;
 
 pub(super) fn run(arguments: &Convert, manner: &Manner) -> Result<u8, Failure> {
     let interrupt = Interrupt::on_signals();
@@ -48,7 +49,8 @@ pub(super) fn run(arguments: &Convert, manner: &Manner) -> Result<u8, Failure> {
         return Err(failure);
     }
     out.commit()?;
-    tell(&converted, verdict.as_ref(), &origin, &target, manner)?;
+    let slow = SlowFlow::of(&converted.slow_flow, job.plan.filament.least_flow);
+    tell(&converted, slow.as_ref(), verdict.as_ref(), (&origin, &target), manner)?;
     let is_clean = verdict.is_none_or(|verdict| verdict.findings.is_empty());
     Ok(if is_clean && converted.left_out == 0 { DONE } else { LOOK })
 }
@@ -96,15 +98,15 @@ pub(super) fn target(arguments: &Convert) -> PathBuf {
 
 fn tell(
     converted: &Converted,
+    slow: Option<&SlowFlow>,
     verdict: Option<&Verdict>,
-    origin: &Vector2<f64>,
-    target: &Path,
+    (origin, target): (&Vector2<f64>, &Path),
     manner: &Manner,
 ) -> Result<(), Failure> {
     if target == Path::new("-") || manner.quiet && !manner.json {
         return Ok(());
     }
-    let Converted { lines, written, filament, time, left_out } = *converted;
+    let Converted { lines, written, filament, time, left_out, .. } = *converted;
     if manner.json {
         return say_json(&serde_json::json!({
             "lines": lines,
@@ -112,6 +114,7 @@ fn tell(
             "filament_mm": filament,
             "time_s": time,
             "left_out": left_out,
+            "slow_flow": slow,
             "origin_mm": [origin.x, origin.y],
             "verify": verdict.map(|verdict| serde_json::json!({"findings": findings(verdict)})),
         }));
@@ -125,6 +128,9 @@ fn tell(
         text.push_str(&format!(
             "{left_out} commands are longer than firmwares read and were left out\n"
         ));
+    }
+    if let Some(slow) = slow {
+        text.push_str(&format!("slow flow  {slow}\n"));
     }
     for finding in verdict.iter().flat_map(|verdict| &verdict.findings) {
         text.push_str(&format!("{finding}\n"));

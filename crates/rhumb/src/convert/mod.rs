@@ -25,6 +25,7 @@ use machine::program::Step;
 use nalgebra::Vector2;
 use plan::follow::{Followed, Follower};
 use plan::resample::ResampleParams;
+use plan::slow_flow::{FlowWatch, SlowFlow};
 use twin::verify::Verdict;
 
 use crate::check::check;
@@ -64,6 +65,8 @@ pub struct Converted {
     pub time: f64,
     /// Commands left out because no firmware reads lines that long.
     pub left_out: usize,
+    /// What is laid with less flow than the filament should have.
+    pub slow_flow: SlowFlow,
 }
 
 /// Batches on their way from one part of the work to the next.
@@ -194,6 +197,7 @@ struct Writing<'a> {
     dialect: &'static str,
     text: Emitter<&'a mut dyn Write>,
     converted: Converted,
+    flow: FlowWatch,
 }
 
 impl<'a> Writing<'a> {
@@ -203,6 +207,7 @@ impl<'a> Writing<'a> {
             dialect: job.dialect.name,
             text: Emitter::for_printer(out, job.dialect, &job.printer),
             converted: Converted::default(),
+            flow: FlowWatch::new(job.plan.filament.least_flow, job.plan.filament.area),
         }
     }
 
@@ -224,6 +229,7 @@ impl<'a> Writing<'a> {
             }
             for motion in moves.by_ref().take(count) {
                 self.converted.filament += motion.filament;
+                self.flow.look(&motion);
                 self.text.step(&Step::Move(motion)).map_err(written)?;
             }
         }
@@ -265,6 +271,7 @@ impl<'a> Writing<'a> {
             .and_then(|()| self.text.comment(&format!("dialect = {}", self.dialect)))
             .map_err(written)?;
         self.converted.written = self.text.lines();
+        self.converted.slow_flow = self.flow.found();
         self.text.finish().map_err(written)?;
         Ok(self.converted)
     }

@@ -621,6 +621,14 @@ pub const KEYS: &[Key] = &[
     ),
     number(
         Material,
+        "min_volumetric_speed_mm3_per_s",
+        "filament_min_volumetric_speed",
+        (0.1, 0.0, 200.0),
+        "least volume in a second without oozing and cooking: short layers are not slowed down \
+         further, and beads near the axis, where the bed is too slow for it, are reported; 0 for none",
+    ),
+    number(
+        Material,
         "retract_length_mm",
         "retract_length",
         (0.8, 0.0, 20.0),

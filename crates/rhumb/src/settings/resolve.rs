@@ -445,6 +445,7 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
             area: std::f64::consts::FRAC_PI_4 * diameter * diameter,
             multiplier: get.number("extrusion_multiplier"),
             volume_per_second: get.number("max_volumetric_speed_mm3_per_s"),
+            least_flow: get.number("min_volumetric_speed_mm3_per_s"),
             retract_length: get.number("retract_length_mm"),
             retract_speed: get.number("retract_speed_mm_per_s"),
             retract_before_travel: get.number("retract_before_travel_mm"),
