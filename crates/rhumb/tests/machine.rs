@@ -228,6 +228,41 @@ fn a_probed_bed_and_a_loose_drive_print_the_same_part() {
 }
 
 #[test]
+fn no_firmware_gets_more_moves_in_a_second_than_it_takes() {
+    // 7200 facets round the axis and as many round a hole beside it: sides of 14 and 3 µm.
+    let ring = |x: f64, radius: f64| -> Vec<[f64; 2]> {
+        (0..7200)
+            .map(|k| (f64::from(k) * 0.05).to_radians())
+            .map(|angle| [x + radius * angle.cos(), radius * angle.sin()])
+            .collect()
+    };
+    let model = shapes::extruded(&ring(0.0, 16.0), &[ring(8.0, 4.0)], 0.6);
+    for printer in ["marlin-polar", "klipper-polar", "core-r-theta"] {
+        let fast = ["external_perimeter_speed_mm_per_s=200", "perimeter_speed_mm_per_s=200"];
+        let (settings, job) = job(printer, &fast);
+        let text = program(&model, &settings, &job);
+        let limit = job.printer.moves_per_second;
+        // Ends of all moves, s.
+        let (mut ends, mut shortest) = (vec![0.0], f64::INFINITY);
+        check(text.as_slice(), &job, None, false, |segment| {
+            if segment.duration > 0.0 {
+                shortest = segment.duration.min(shortest);
+                ends.push(ends.last().expect("one at least") + segment.duration);
+            }
+        })
+        .expect("memory");
+        assert!(ends.len() > 1000, "{printer}: {}", ends.len());
+        // Rounding of `F` and of the ends of a move is a hundredth at the most.
+        assert!(shortest * limit > 0.99, "{printer}: {} a second", 1.0 / shortest);
+        let most = (limit / 10.0).ceil() as usize;
+        for window in ends.windows(most + 1) {
+            let moves = most as f64 / (window[most] - window[0]);
+            assert!(moves <= 1.005 * limit, "{printer}: {moves} a second");
+        }
+    }
+}
+
+#[test]
 fn slow_flow_beside_the_axis_is_told_and_there_is_none_elsewhere() {
     let disc: Vec<[f64; 2]> = (0..90)
         .map(|k| (f64::from(k) * 4.0).to_radians())
