@@ -5,6 +5,7 @@ use machine::kinematics::Alignment;
 use machine::profile::Printer;
 use machine::program::Role;
 use nalgebra::{Point2, Vector2};
+use rhumb::calibration::Calibration;
 use rhumb::check::check;
 use rhumb::convert::{Converted, Request, convert, convert_checked, middle};
 use rhumb::failure::Failure;
@@ -107,6 +108,70 @@ fn every_dialect_prints_the_source() {
     }
     for dialect in ALL.iter().filter(|dialect| dialect.name != "cartesian") {
         assert!(seen.contains(&dialect.name), "{}", dialect.name);
+    }
+}
+
+/// Every error of a machine that a calibration file can name, but for the height of its bed.
+const CALIBRATION: &str = "\
+[rail]
+a_mm = 0.213
+b_mm = 0.5
+[column]
+a1 = 0.001
+b1 = -0.0015
+[plate]
+ex_mm = 0.12
+ey_mm = -0.05
+psi_deg = 1.5
+[bed]
+theta_zero_deg = 3
+backlash_deg = 0.05
+";
+
+/// How far a place is from the wall of the [square] or, of its infill, from the diagonal.
+fn off_source(role: Role, p: &Point2<f64>) -> f64 {
+    if role == Role::ExternalPerimeter {
+        return off_square(p);
+    }
+    let along = Vector2::new(20.7, 20.0).normalize();
+    along.perp(&(p - Point2::new(-HALF, -HALF))).abs()
+}
+
+#[test]
+fn a_calibration_file_prints_the_source_on_the_machine_that_it_describes() {
+    let calibration = Calibration::read(CALIBRATION.as_bytes(), "machine.toml").unwrap();
+    for printer in ["klipper-polar", "rrf-polar", "marlin-polar", "grblhal-polar", "generic-polar"]
+    {
+        let ideal = job(printer);
+        let mut real = ideal.clone();
+        calibration.apply(&mut real.printer, real.bed_map_fade).unwrap();
+        // Beside the axis the way goes round it.
+        let round_axis = 2.0 * real.printer.axis_clearance + 0.5;
+        // The farthest that the real machine's nozzle comes from the source, outside of that.
+        let worst = |planned_for: &Job| {
+            let (text, _) = converted(&square(), planned_for, [100.0, 100.0]).unwrap();
+            let (mut worst, mut places) = (0.0_f64, [0, 0]);
+            check(text.as_bytes(), &real, None, false, |segment| {
+                if !segment.extrudes() || segment.role == Role::Custom {
+                    return;
+                }
+                for k in 0..=16 {
+                    let over_bed = segment.curve.over_bed(f64::from(k) / 16.0);
+                    let place = real.printer.alignment.part_from_bed(&over_bed);
+                    if place.coords.norm() > round_axis {
+                        worst = worst.max(off_source(segment.role, &place));
+                        places[usize::from(segment.role == Role::ExternalPerimeter)] += 1;
+                    }
+                }
+            })
+            .unwrap();
+            assert!(places.iter().all(|&count| count > 100), "{printer}: {places:?}");
+            worst
+        };
+        let (corrected, naive) = (worst(&real), worst(&ideal));
+        let chord = ideal.plan.resample.chord;
+        assert!(corrected <= chord + 0.001, "{printer}: {corrected}");
+        assert!(naive > 0.4, "{printer}: without the file {naive}");
     }
 }
 
