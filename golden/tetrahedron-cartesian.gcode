@@ -655,7 +655,7 @@ M140 S0
 M107
 M84
 ; estimated printing time (normal mode) = 22s
-; filament used [mm] = 5.08
+; filament used [mm] = 5.08465
 ; filament used [cm3] = 0.01
 ; filament used [g] = 0.02
 ; total filament used [g] = 0.02
@@ -688,6 +688,8 @@ M84
 ; nozzle_half_angle = 15
 ; nozzle_block_height = 30
 ; nozzle_block_radius = 20
+; carriage_height = 60
+; carriage_width = 60
 ; min_layer_height = 0.04
 ; max_layer_height = 0.32
 ; max_nozzle_temperature = 280

@@ -511,7 +511,7 @@ pub struct Send {
     /// Its key; better in RHUMB_API_KEY or in the key file, where other users do not see it
     #[arg(long, value_name = "KEY")]
     pub api_key: Option<String>,
-    /// A file with keys, lines of "HOST[:PORT]" = "KEY", that only its owner can read
+    /// A file with keys, lines of `"HOST:PORT" = "KEY"`, that only its owner can read
     /// [default: ~/.config/rhumb/keys.toml]
     #[arg(long, value_name = "KEYS.toml")]
     pub keys: Option<PathBuf>,
