@@ -64,6 +64,10 @@ impl MovedSides {
                 continue;
             }
             let Some([to, from]) = crossing(before, after) else { continue };
+            // They must meet before either of them reaches the side between.
+            if to > self.to[before] || from < self.from[after] {
+                continue;
+            }
             left -= 1;
             self.left_out[side] = true;
             (self.to[before], self.after[before]) = (to, after);
@@ -121,5 +125,24 @@ impl MovedSides {
     #[must_use]
     pub fn fit_around(&self, side: usize) -> bool {
         self.fits(self.before[side]) && self.fits(side)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_side_is_left_out_only_when_its_neighbours_meet_before_they_reach_it() {
+        // Side 1 would begin at 2 and end at 0.5; side 0 reaches it at 8, side 2 leaves it at 0.5.
+        let lost = [None, Some([2.0, 2.0]), Some([0.5, 0.5]), None];
+        let kept = |meeting: [f64; 2]| {
+            let mut sides = MovedSides::new(&[10.0, 1.0, 10.0, 10.0], &lost);
+            sides.leave_out_short(|_, _| Some(meeting));
+            sides.kept().collect::<Vec<_>>()
+        };
+        assert_eq!(kept([7.5, 1.0]), [0, 2, 3]);
+        assert_eq!(kept([9.0, 1.0]), [0, 1, 2, 3]);
+        assert_eq!(kept([7.5, 0.1]), [0, 1, 2, 3]);
     }
 }
