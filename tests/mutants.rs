@@ -57,12 +57,11 @@ impl Places<'_> {
         meant[mixed as usize % meant.len()]
     }
 
-    /// Whether a line lays material along a way that can be seen, more than the hundredth of a
-    /// millimetre of filament to which a program declares its total, and not at the axis.
+    /// Whether a line lays material, and not at the axis, where lines that go round it are not judged.
     fn lays(&self, at: usize) -> bool {
         let line = &self.lines[at];
         let rail = number(line, 'R').unwrap_or(0.0).abs();
-        number(line, 'E').is_some_and(|filament| filament > 0.012) && rail > 2.0
+        number(line, 'E').is_some_and(|filament| filament > 0.002) && rail > 2.0
     }
 
     fn bead(&self) -> usize {
