@@ -13,11 +13,11 @@
 //! engine in [`region`], the Delaunay triangulation in [`triangulate`], the bounding volume
 //! hierarchy in [`bounding`], its distances in [`lift`].
 
+mod boolean;
 pub mod bounding;
 pub mod circle;
 pub mod grid;
 pub mod lift;
-mod nesting;
 pub mod offset;
 pub mod polyline;
 pub mod region;
