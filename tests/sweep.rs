@@ -124,7 +124,7 @@ const MOST_REFUSED: f64 = 0.3;
 fn fault(code: Option<i32>, out: &str, err: &str) -> Option<String> {
     match code {
         // Refused for a reason: model and machine, settings that do not go together, or a budget.
-        Some(5 | 6 | 8 | 9) if err.starts_with("error[") => None,
+        Some(5 | 6 | 8) if err.starts_with("error[") => None,
         Some(0 | 1) => {
             let report: Value = serde_json::from_str(out).ok()?;
             let findings = report["verify"]["findings"].as_array()?;

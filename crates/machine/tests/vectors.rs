@@ -200,7 +200,9 @@ fn inverse_time_words() {
     for case in all["F_words"].as_array().unwrap() {
         let turn = number(case, "dC_deg").to_radians();
         let length = number(case, "ds").hypot(number(case, "dz"));
-        let way = Way { path: length, words: length, filament: 0.0, turn, radius: 20.0 };
+        let ends = [[0.0; 2]; 2];
+        let rise = number(case, "dz");
+        let way = Way { path: length, words: length, filament: 0.0, turn, ends, rise };
         let word = SpeedWord::InverseTime.word(&way, number(case, "T"));
         assert!((word - number(case, "F_G93")).abs() < 1e-9, "{case}: {word}");
     }

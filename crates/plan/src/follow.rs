@@ -3,21 +3,21 @@
 //! The same subdivision, axis rules and speed law as for our own layers, for ways that come from
 //! elsewhere, such as another slicer's program. Between two calls the machine comes to rest.
 
-use machine::gcode::dialect::Space;
+use machine::gcode::Dialect;
 use machine::kinematics::Unreachable;
 use machine::profile::Printer;
 use machine::program::Move;
 
 use crate::resample::{FlatLegs, Leg, ResampleParams, Resampler};
 use crate::route::Stroke;
-use crate::speed::{Limits, Pace, durations, travels};
+use crate::speed::{Limits, Pace, durations, taken, travels};
 use crate::time;
 
 /// Follows strokes; remembers where the machine stands. See the [module](self).
 #[derive(Debug, Clone)]
 pub struct Follower {
     printer: Printer,
-    space: Space,
+    dialect: Dialect,
     resampler: Resampler,
     limits: Limits,
     pace: Pace,
@@ -64,7 +64,7 @@ impl Follower {
     pub fn new(printer: &Printer, params: ResampleParams) -> Self {
         Self {
             printer: printer.clone(),
-            space: params.dialect.space,
+            dialect: params.dialect.on(printer),
             resampler: Resampler::new(printer, params),
             limits: Limits::of(printer, params.dialect.space),
             pace: Pace::REST,
@@ -92,7 +92,8 @@ impl Follower {
         let travels = travels(&legs, start);
         let (times, pace) = durations(&legs, &travels, self.pace, &self.limits);
         self.pace = pace;
-        self.time += time::estimate(&legs, &travels, &times, &self.printer, self.space);
+        let taken = taken(&legs, start, &times, &self.dialect);
+        self.time += time::estimate(&legs, &travels, &taken, &self.printer, self.dialect.space);
         Ok(Followed { legs, durations: times, counts })
     }
 

@@ -13,7 +13,7 @@ use crate::resample::{Leg, ResampleParams, Resampler};
 use crate::route::{FilamentParams, Item, Kind, Router, Speeds, Stroke};
 use crate::seam::SeamMemory;
 use crate::slow_flow::{FlowWatch, SlowFlow};
-use crate::speed::{Limits, Pace, durations, travels};
+use crate::speed::{Limits, Pace, durations, taken, travels};
 use crate::time;
 
 /// Choices of the plan.
@@ -112,7 +112,8 @@ pub struct Planner<'a> {
 impl<'a> Planner<'a> {
     /// Returns a planner for a printer at its home position.
     #[must_use]
-    pub fn new(printer: &'a Printer, params: PlanParams) -> Self {
+    pub fn new(printer: &'a Printer, mut params: PlanParams) -> Self {
+        params.resample.dialect = params.resample.dialect.on(printer);
         let resampler = Resampler::new(printer, params.resample);
         let resampler = if params.curved { resampler.on_near_side() } else { resampler };
         let printed = params.curved.then(|| Printed::nothing(printer.rail.max));
@@ -168,7 +169,7 @@ impl<'a> Planner<'a> {
         let fail = |source| PlanError { layer: 0, source };
         let mut steps = self.lower(items).map_err(fail)?;
         let from = self.resampler.joints();
-        let to = Joints { s: self.printer.home.s, ..from };
+        let to = self.resampler.as_written(&Joints { s: self.printer.home.s, ..from });
         let path = (to.s - from.s).abs();
         if path > 0.0 {
             let at = self.printer.alignment.part_from_joints(&to);
@@ -254,20 +255,17 @@ impl<'a> Planner<'a> {
             (times, pace) = durations(&legs, &travels, self.pace, &self.limits);
         }
         self.pace = pace;
-        self.totals.time += time::estimate(
-            &legs,
-            &travels,
-            &times,
-            self.printer,
-            self.params.resample.dialect.space,
-        );
+        let dialect = &self.params.resample.dialect;
+        let taken = taken(&legs, start, &times, dialect);
+        self.totals.time += time::estimate(&legs, &travels, &taken, self.printer, dialect.space);
         for (leg, travel) in legs.iter().zip(&travels) {
             self.count(leg, travel.axes[1]);
         }
-        let mut timed = legs.iter().zip(times).map(|(leg, duration)| {
+        let mut timed = legs.iter().zip(times.iter().zip(taken.iter())).map(|(leg, times)| {
+            let (&duration, &taken) = times;
             let motion =
                 Move { to: leg.to, at: leg.at, filament: leg.filament, path: leg.path, duration };
-            self.flow.look(&motion);
+            self.flow.look(&Move { duration: taken, ..motion });
             Step::Move(motion)
         });
         sizes.iter().map(|&size| timed.by_ref().take(size).collect()).collect()

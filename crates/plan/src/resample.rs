@@ -1,10 +1,9 @@
 //! Strokes over the part become moves of the joints.
 //!
-//! A move is straight in joint space, which over the part is a piece of a spiral. A stroke is halved
-//! until every piece lies within the chord tolerance of it: the deviation is measured with the
-//! forward kinematics at a quarter, half and three quarters of the piece, and the bed turns by at
-//! most 60° in one move (the rule of the calibration's derivation; any alignment is covered, at the
-//! price of up to 1.8 times the least possible number of moves).
+//! A move is straight in joint space, which over the part is a piece of a spiral. A stroke is cut into
+//! as few as lie within the chord tolerance of it ([`division`]): the deviation is measured with the
+//! forward kinematics at a quarter, half and three quarters of each piece, and the bed turns by at
+//! most 60° in one move; any alignment is covered.
 //!
 //! Positions are rounded here as the text will round them, so that lengths, speeds and
 //! accelerations are planned for the very moves that a reader of the program sees.
@@ -14,6 +13,7 @@
 //! is one move to the other side of the rail, and the bed does not turn at all; what follows is
 //! then laid from the far side, as far as the rail reaches.
 
+mod division;
 mod long_move;
 
 use machine::gcode::Dialect;
@@ -96,9 +96,6 @@ const REACH_SLACK_MM: f64 = 5e-4;
 /// Times the tolerance, as estimated, beyond which a move is not looked at closely.
 const SURELY: f64 = 2.0;
 
-/// Halvings after which a piece is taken as it is; 2⁻⁴⁰ of any stroke is far below a step.
-const MOST_HALVINGS: u32 = 40;
-
 /// The legs of consecutive strokes in one list.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FlatLegs {
@@ -132,6 +129,8 @@ pub struct Resampler {
     at_part: Point3<f64>,
     /// Filament of strokes too short to be moves, for the next one that lays material, mm.
     owed: f64,
+    /// The same drawn back, for the next stroke that lays none.
+    owed_back: f64,
 }
 
 /// Where the nozzle is to be, over the bed.
@@ -162,6 +161,7 @@ impl Resampler {
             over_bed: Point2::from(printer.alignment.over_bed(&at.xy())),
             at_part: at,
             owed: 0.0,
+            owed_back: 0.0,
         }
     }
 
@@ -287,13 +287,14 @@ impl Resampler {
         if path == 0.0 && stroke.filament == 0.0 {
             return Ok(());
         }
+        let filament = self.with_owed(stroke.kind, stroke.filament, true);
         self.joints = to;
         self.at_part = self.alignment.part_from_joints(&to);
         legs.push(Leg {
             kind: stroke.kind,
             to,
             at: self.at_part,
-            filament: stroke.filament,
+            filament,
             path,
             speed: stroke.speed,
         });
@@ -367,12 +368,12 @@ impl Resampler {
     /// The filament of a stroke with what strokes before it could not lay; or none, when it is too
     /// short to be a move itself.
     fn with_owed(&mut self, kind: Kind, filament: f64, moves: bool) -> f64 {
-        if !moves {
-            self.owed += filament;
-            return 0.0;
+        let owed = if kind == Kind::Print { &mut self.owed } else { &mut self.owed_back };
+        if moves {
+            return filament + std::mem::take(owed);
         }
-        let owed = if kind == Kind::Print { std::mem::take(&mut self.owed) } else { 0.0 };
-        filament + owed
+        *owed += filament;
+        0.0
     }
 
     /// Follows a stroke on the present side of the rail, round the axis where need be.
@@ -422,44 +423,6 @@ impl Resampler {
             Space::Joints | Space::Part => 1.0,
         };
         self.alignment.clear_radius_at(self.clearance, z) / chords_keep_clear
-    }
-
-    /// A straight piece, halved until its moves are near enough to it.
-    fn line(
-        &mut self,
-        kind: Kind,
-        target: &Target,
-        tolerance: f64,
-        legs: &mut Vec<Leg>,
-    ) -> Result<(), Unreachable> {
-        let to = self.joints_at(target)?;
-        self.halves(kind, (target, to), tolerance, 0, legs)
-    }
-
-    /// The same, once the joints at its end are known.
-    fn halves(
-        &mut self,
-        kind: Kind,
-        (target, to): (&Target, Joints),
-        tolerance: f64,
-        halvings: u32,
-        legs: &mut Vec<Leg>,
-    ) -> Result<(), Unreachable> {
-        let is_near_enough = || {
-            !self.is_surely_too_far(&to, target, tolerance)
-                && self.is_near_enough(&to, target, tolerance)
-                && (kind != Kind::Print || self.follows_bed(target))
-        };
-        if halvings < MOST_HALVINGS && !is_near_enough() {
-            let middle = Target {
-                over_bed: nalgebra::center(&self.over_bed, &target.over_bed),
-                z: f64::midpoint(self.joints.z, target.z),
-            };
-            let halfway = self.joints_at(&middle)?;
-            self.halves(kind, (&middle, halfway), tolerance, halvings + 1, legs)?;
-            return self.halves(kind, (target, to), tolerance, halvings + 1, legs);
-        }
-        self.push(kind, to, target, legs)
     }
 
     /// Whether the move to `to` leaves its line by far more than the tolerance. Its deviation in the
@@ -521,10 +484,15 @@ impl Resampler {
         (2.0 * turn * run + turn * turn * reach) / 8.0 + ROUNDING_MM
     }
 
+    /// Whether there is nothing in the height of the bed to be followed.
+    fn follows_bed_anyhow(&self, target: &Target) -> bool {
+        self.bed_map.is_flat() || self.joints.z.min(target.z) >= self.bed_map.fade()
+    }
+
     /// Whether the lift, running evenly, keeps to the bed as it was probed.
     fn follows_bed(&self, target: &Target) -> bool {
         let map = &self.bed_map;
-        if map.is_flat() || self.joints.z.min(target.z) >= map.fade() {
+        if self.follows_bed_anyhow(target) {
             return true;
         }
         let (from, to) = (self.over_bed.coords, target.over_bed.coords);
@@ -598,7 +566,7 @@ impl Resampler {
     ) -> Result<(), Unreachable> {
         within(&self.rail, "carriage", to.s)?;
         within(&self.lift, "lift", to.z)?;
-        let to = self.params.dialect.rounded_joints(&to);
+        let to = self.as_written(&to);
         let at = self.alignment.part_from_joints(&to);
         let path = self.path_length(&to, at);
         if path < LEAST_PATH_MM {
@@ -609,6 +577,17 @@ impl Resampler {
         self.at_part = at;
         legs.push(Leg { kind, to, at, filament: 0.0, path, speed: 0.0 });
         Ok(())
+    }
+
+    /// Joints as the text will say them, within the reach of the rail.
+    pub(crate) fn as_written(&self, to: &Joints) -> Joints {
+        let written = self.params.dialect.rounded_joints(to);
+        if written.s <= self.rail.max {
+            return written;
+        }
+        // Two rounded words may stand for a place farther out than either.
+        let s = to.s.min(self.rail.max) - 2.0 * ROUNDING_MM;
+        self.params.dialect.rounded_joints(&Joints { s, ..*to })
     }
 
     /// Length of the way of the nozzle over the part in one move to `to`, which is at `end`.
@@ -721,164 +700,4 @@ fn within(axis: &Axis, name: &'static str, position: f64) -> Result<(), Unreacha
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::testing::printer;
-    use machine::gcode::dialect::{CARTESIAN, POLAR};
-    use std::f64::consts::PI;
-
-    pub(super) const PARAMS: ResampleParams =
-        ResampleParams { chord: 0.005, travel_chord: 0.1, dialect: POLAR, azimuth: 0.0 };
-
-    pub(super) fn print(x: f64, y: f64) -> Stroke {
-        Stroke {
-            kind: Kind::Print,
-            to: Point3::new(x, y, 0.2),
-            filament: 0.1,
-            speed: 50.0,
-            continues: false,
-        }
-    }
-
-    pub(super) fn travel(x: f64, y: f64) -> Stroke {
-        Stroke { kind: Kind::Travel, filament: 0.0, ..print(x, y) }
-    }
-
-    fn legs(resampler: &mut Resampler, strokes: &[Stroke]) -> Vec<Leg> {
-        resampler.legs(strokes).unwrap().into_iter().flatten().collect()
-    }
-
-    /// Greatest distance of joint-linear legs from the line through `a` and `b`.
-    fn deviation(start: Joints, legs: &[Leg], a: [f64; 2], b: [f64; 2]) -> f64 {
-        let (a, b) = (Point2::from(a), Point2::from(b));
-        let mut from = start;
-        let mut worst: f64 = 0.0;
-        for leg in legs {
-            for k in 0..=50 {
-                let p = Alignment::default().part_from_joints(&POLAR.between(
-                    &from,
-                    &leg.to,
-                    f64::from(k) / 50.0,
-                ));
-                worst = worst.max(geom::polyline::distance_to_segment(&a, &b, &p.xy()));
-            }
-            from = leg.to;
-        }
-        worst
-    }
-
-    #[test]
-    fn moves_stay_within_the_chord_tolerance() {
-        for offset in [0.5, 1.0, 3.0, 10.0, 30.0] {
-            let mut resampler = Resampler::new(&printer(), PARAMS);
-            legs(&mut resampler, &[travel(-40.0, offset)]);
-            let start = resampler.joints();
-            let line = legs(&mut resampler, &[print(40.0, offset)]);
-            let worst = deviation(start, &line, [-40.0, offset], [40.0, offset]);
-            assert!(worst <= 0.005 * 1.05, "{worst} at {offset}");
-            assert!(line.len() < 130, "{} moves at {offset}", line.len());
-            let fed: f64 = line.iter().map(|leg| leg.filament).sum();
-            assert!((fed - 0.1).abs() < 1e-12);
-            assert!(line.iter().all(|leg| leg.at.z == 0.2));
-        }
-    }
-
-    #[test]
-    fn a_line_that_grazes_the_axis_goes_round_it() {
-        let mut near_only = printer();
-        near_only.rail.min = 0.0;
-        near_only.axis_clearance = 0.1;
-        for offset in [0.0, 0.03, -0.07] {
-            let mut resampler = Resampler::new(&near_only, PARAMS);
-            legs(&mut resampler, &[travel(-10.0, offset)]);
-            let line = legs(&mut resampler, &[print(10.0, offset)]);
-            let nearest = line.iter().map(|leg| leg.to.s).fold(f64::INFINITY, f64::min);
-            assert!(nearest >= 0.1 - 1e-9, "{nearest}");
-            assert!(line.iter().all(|leg| leg.to.s >= 0.0));
-        }
-    }
-
-    #[test]
-    fn a_line_through_the_axis_turns_nothing_where_the_carriage_can_pass() {
-        let mut resampler = Resampler::new(&printer(), PARAMS);
-        legs(&mut resampler, &[travel(0.0, 15.0), travel(-10.0, 0.0)]);
-        let line = legs(&mut resampler, &[print(10.0, 0.0), print(10.0, 4.0)]);
-        assert_eq!(line[0].to.s, -10.0);
-        assert!((line[0].to.turn.radians().abs() - PI).abs() < 1e-9);
-        assert!(line.iter().all(|leg| leg.to.s < 0.0));
-        // Too long for the far side: round the axis on the near one.
-        let mut resampler = Resampler::new(&printer(), PARAMS);
-        legs(&mut resampler, &[travel(0.0, 15.0), travel(-40.0, 0.0)]);
-        let line = legs(&mut resampler, &[print(40.0, 0.0)]);
-        assert!(line.iter().all(|leg| leg.to.s > 0.0));
-    }
-
-    #[test]
-    fn a_line_that_ends_just_past_the_axis_stays_straight() {
-        for beyond in [0.011, 0.05, 0.3, 5.0] {
-            for miss in [-0.004, 0.0, 0.003] {
-                let mut resampler = Resampler::new(&printer(), PARAMS);
-                legs(&mut resampler, &[travel(0.0, 15.0), travel(-20.0, miss)]);
-                let start = resampler.joints();
-                let line = legs(&mut resampler, &[print(beyond, miss)]);
-                let worst = deviation(start, &line, [-20.0, miss], [beyond, miss]);
-                // The detour round the axis, where there is one, is as wide as the clearance.
-                assert!(
-                    worst <= 0.005 * 1.05 + printer().axis_clearance,
-                    "{worst} {beyond} {miss}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn the_far_side_is_left_when_the_next_run_is_out_of_its_reach() {
-        let mut resampler = Resampler::new(&printer(), PARAMS);
-        legs(&mut resampler, &[travel(0.0, 15.0)]);
-        let prime = Stroke { kind: Kind::Filament, ..travel(12.0, 1.0) };
-        let strokes =
-            [travel(-10.0, 0.0), print(10.0, 0.0), travel(12.0, 1.0), prime, print(60.0, 1.0)];
-        let all = resampler.legs(&strokes).unwrap();
-        assert!(all[1].iter().all(|leg| leg.to.s < 0.0));
-        assert!(all[4].iter().all(|leg| leg.to.s > 0.0));
-        for leg in all.iter().flatten() {
-            assert!(leg.to.s >= -25.0);
-        }
-    }
-
-    #[test]
-    fn ends_on_the_axis_are_kept_clear_of_it() {
-        let mut resampler = Resampler::new(&printer(), PARAMS);
-        let path = [travel(5.0, 5.0), print(0.0, 0.0), print(-4.0, 3.0)];
-        for leg in legs(&mut resampler, &path) {
-            assert!(leg.to.s.abs() >= printer().axis_clearance - 1e-9);
-        }
-    }
-
-    #[test]
-    fn the_azimuth_turns_the_bed_and_nothing_else() {
-        let strokes = [travel(12.0, 3.0), print(-9.0, 7.0), print(-9.0, -20.0)];
-        let mut plain = Resampler::new(&printer(), PARAMS);
-        // A whole number of the last place of an angle, so that rounding turns along.
-        let azimuth = 45.8366_f64.to_radians();
-        let mut turned = Resampler::new(&printer(), ResampleParams { azimuth, ..PARAMS });
-        let (plain, turned) = (legs(&mut plain, &strokes), legs(&mut turned, &strokes));
-        // The first stroke comes from home, which does not turn with the part.
-        let first = plain.iter().position(|leg| leg.kind == Kind::Print).unwrap();
-        let offset = turned.len() - plain.len();
-        for (a, b) in plain[first..].iter().zip(&turned[first + offset..]) {
-            assert!((a.to.s - b.to.s).abs() < 1e-9);
-            let turn = b.to.turn.radians() - a.to.turn.radians() - azimuth;
-            assert!(turn.abs() < 1e-9, "{turn}");
-        }
-    }
-
-    #[test]
-    fn straight_dialects_get_one_leg_a_stroke() {
-        let params = ResampleParams { dialect: CARTESIAN, ..PARAMS };
-        let mut resampler = Resampler::new(&printer(), params);
-        let all = resampler.legs(&[travel(-40.0, 1.0), print(40.0, 1.0)]).unwrap();
-        assert_eq!((all[0].len(), all[1].len()), (1, 1));
-        assert!((all[1][0].path - 80.0).abs() < 1e-9);
-    }
-}
+mod tests;

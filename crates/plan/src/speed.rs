@@ -15,8 +15,13 @@
 //! the rule holds everywhere; of two moves the one that is faster in the violated axis gives way.
 //! Durations only ever grow, and doubling both of a pair quarters what it violates, so this ends.
 
+use std::borrow::Cow;
+
+use machine::gcode::Dialect;
 use machine::gcode::dialect::Space;
+use machine::gcode::speed_word::SpeedWord;
 use machine::profile::Printer;
+use machine::program::Joints;
 
 use crate::resample::Leg;
 
@@ -124,7 +129,7 @@ pub(crate) struct Travel {
 }
 
 /// Returns what the axes do in each leg that begins where the one before ends.
-pub(crate) fn travels(legs: &[Leg], start: machine::program::Joints) -> Vec<Travel> {
+pub(crate) fn travels(legs: &[Leg], start: Joints) -> Vec<Travel> {
     let mut from = start;
     legs.iter()
         .map(|leg| {
@@ -136,6 +141,29 @@ pub(crate) fn travels(legs: &[Leg], start: machine::program::Joints) -> Vec<Trav
             travel
         })
         .collect()
+}
+
+/// Returns how long the firmware will take for each leg, s: as planned, but where it sets the pace
+/// itself.
+pub(crate) fn taken<'a>(
+    legs: &[Leg],
+    start: Joints,
+    planned: &'a [f64],
+    dialect: &Dialect,
+) -> Cow<'a, [f64]> {
+    if !matches!(dialect.speed, SpeedWord::MarlinPolar(_)) {
+        return planned.into();
+    }
+    let mut from = start;
+    let taken = legs.iter().zip(planned).map(|(leg, &duration)| {
+        let way = dialect.way(&from, &leg.to, leg.path, leg.filament);
+        from = leg.to;
+        if !dialect.speed.sets_the_pace(&way) {
+            return duration;
+        }
+        dialect.speed.duration(&way, dialect.speed.word(&way, duration))
+    });
+    taken.collect()
 }
 
 /// What the axes of the law do in a leg.
@@ -441,7 +469,7 @@ mod tests {
 
     /// Legs along the rail, by their way, lift and filament, with what they last.
     fn along_the_rail(legs: &[[f64; 3]], speed: f64) -> (Vec<Leg>, Vec<Travel>, Vec<f64>) {
-        use machine::program::{BedTurn, Joints};
+        use machine::program::BedTurn;
         let mut to = Joints { s: 20.0, turn: BedTurn::default(), z: 1.0 };
         let start = to;
         let legs: Vec<Leg> = legs

@@ -63,7 +63,7 @@ fn printer(alignment: Alignment, at: Point3<f64>) -> Printer {
 }
 
 #[test]
-fn lines_are_cut_as_often_as_published() {
+fn lines_are_cut_no_more_often_than_by_halving() {
     let Some(all) = vectors() else { return };
     for case in all["segments_bisection"]["cases"].as_array().unwrap() {
         let model = &all["models"][case["model"].as_str().unwrap()];
@@ -83,9 +83,8 @@ fn lines_are_cut_as_often_as_published() {
         };
         let legs = resampler.legs(&[stroke]).unwrap();
         let (count, published) = (legs[0].len() as f64, number(case, "count"));
-        // Positions are rounded to a thousandth, a tenth of some tolerances here: a piece that is
-        // just near enough may be halved once more, or not.
-        assert!((count - published).abs() <= 0.05 * published, "{count} {published}");
+        // The published numbers are those of halving; lines are cut better than that.
+        assert!(count <= published && count >= 0.5 * published, "{count} {published}");
     }
 }
 
@@ -112,9 +111,11 @@ fn lines_past_the_axis_need_hardly_more_moves_than_the_least() {
             let printer = printer(alignment, Point3::new(d, ends[0], 0.0));
             let moves = past_the_axis(&printer, ends, d, eps);
             let (count, least) = (moves.len() as f64, number(case, "I"));
-            // Halving makes up to 1.8 times as many as cutting at the best places; the formula itself
-            // may be 5 % below what is needed.
-            assert!(count >= 0.95 * least && count <= 1.8 * least, "{key} {d}: {count} {least}");
+            // The formula itself may be 5 % below what is needed.
+            assert!(
+                count >= 0.95 * least && count <= 1.1 * least + 1.0,
+                "{key} {d}: {count} {least}"
+            );
             for (from, motion) in &moves {
                 for share in [0.2, 0.4, 0.5, 0.6, 0.8] {
                     let at = alignment.part_from_joints(&POLAR.between(from, &motion.to, share));
@@ -168,7 +169,8 @@ fn words_over_all_axes_mean_the_duration() {
     let Some(all) = vectors() else { return };
     for case in all["F_words"].as_array().unwrap() {
         let words = number(case, "ds").hypot(number(case, "dC_deg")).hypot(number(case, "dz"));
-        let way = Way { path: 1.0, words, filament: 0.0, turn: 0.0, radius: 50.0 };
+        let ends = [[0.0; 2]; 2];
+        let way = Way { path: 1.0, words, filament: 0.0, turn: 0.0, ends, rise: 0.0 };
         let duration = number(case, "T");
         let mixed = SpeedWord::Words.word(&way, duration);
         assert!((mixed - number(case, "F_mixed")).abs() < 1e-6, "{mixed}");

@@ -11,6 +11,9 @@ use crate::failure::Failure;
 use crate::report;
 use crate::settings::Job;
 
+/// Chord tolerance and simplification that every proof allows, mm: those of the default settings.
+const USUAL_TOLERANCE: f64 = 0.005 + 0.002;
+
 /// Reads a program line by line and judges it, `thorough`ly or as fast as it can; `each` sees every
 /// motion.
 ///
@@ -28,6 +31,8 @@ pub fn check(
         printer: &job.printer,
         dialect: job.dialect,
         filament_area: job.plan.filament.area,
+        multiplier: job.plan.filament.multiplier,
+        coarse: (job.plan.resample.chord + job.paths.tolerance - USUAL_TOLERANCE).max(0.0),
         volume_per_second: job.plan.filament.volume_per_second,
         mesh: part,
         solid: job.paths.skins.all_solid,

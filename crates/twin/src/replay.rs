@@ -113,7 +113,7 @@ impl Replay {
             bed_map: printer.bed_map.clone(),
             bed: LooseBed::new(printer.alignment.bed.backlash, printer.home.turn),
             home: printer.home,
-            dialect: dialect.on_bed(printer.rail.max),
+            dialect: dialect.on(printer),
             line: 0,
             stand: Stand::at_home(&printer.home, &dialect, &printer.alignment),
             speed_word: 0.0,
@@ -267,7 +267,7 @@ impl Replay {
         };
         let path = curve.length();
         let distance = if path > 0.0 { path } else { filament.abs() };
-        let duration = self.duration(from, path, filament);
+        let (duration, is_paced) = self.pace(from, path, filament);
         let speed = if duration > 0.0 { distance / duration } else { 0.0 };
         Segment {
             line: self.line,
@@ -285,27 +285,32 @@ impl Replay {
                 _ => Feed::mm_per_s(speed),
             },
             duration,
+            is_paced,
         }
     }
 
-    fn duration(&self, from: &Stand, path: f64, filament: f64) -> f64 {
+    /// How long a line takes, s, and whether the firmware sets the pace of it.
+    fn pace(&self, from: &Stand, path: f64, filament: f64) -> (f64, bool) {
         if self.speed_word <= 0.0 {
-            return 0.0;
+            return (0.0, false);
         }
         let to = &self.stand;
+        let rise = to.z - from.z;
         let [x, y] = [0, 1].map(|k| to.plane[k] - from.plane[k]);
         let words = match self.dialect.speed {
             SpeedWord::Nozzle | SpeedWord::InverseTime => 0.0,
-            _ => x.hypot(y).hypot(to.z - from.z),
+            _ => x.hypot(y).hypot(rise),
         };
         let way = Way {
             path,
             words,
             filament,
             turn: to.drive.radians() - from.drive.radians(),
-            radius: to.joints.map_or(0.0, |joints| joints.s.abs()),
+            ends: [from.plane, to.plane],
+            rise,
         };
-        self.dialect.speed.duration(&way, self.speed_word)
+        let speed = &self.dialect.speed;
+        (speed.duration(&way, self.speed_word), speed.sets_the_pace(&way))
     }
 
     fn comment(&mut self, comment: &str) -> Event {

@@ -66,7 +66,8 @@ const THICKEST: f64 = 2.0;
 impl<'a> Watch<'a> {
     /// Returns the watch over a bare bed.
     pub(crate) fn new(setup: &Setup<'a>) -> Self {
-        let Setup { printer, filament_area, .. } = *setup;
+        let Setup { printer, .. } = *setup;
+        let filament_area = setup.filament_area / setup.multiplier;
         Self {
             alignment: printer.alignment,
             filament_area,

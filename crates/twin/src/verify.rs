@@ -5,8 +5,9 @@
 //! use twin::verify::{Setup, Verifier};
 //! # fn example(printer: &machine::profile::Printer, mesh: &mesh::mesh::Mesh, text: &str) {
 //! let filament_area = 2.405;
-//! let setup = Setup { printer, dialect: POLAR, filament_area, volume_per_second: 11.0,
-//!                     mesh: Some(mesh), solid: false, thorough: false };
+//! let setup = Setup { printer, dialect: POLAR, filament_area, multiplier: 1.0,
+//!                     volume_per_second: 11.0, coarse: 0.0, mesh: Some(mesh), solid: false,
+//!                     thorough: false };
 //! let mut verifier = Verifier::new(setup);
 //! for line in text.lines() {
 //!     verifier.line(line);
@@ -57,6 +58,11 @@ pub struct Setup<'a> {
     pub dialect: Dialect,
     /// The cross-section of the filament, mm².
     pub filament_area: f64,
+    /// Filament fed for each that the volume asks for (`extrusion_multiplier`).
+    pub multiplier: f64,
+    /// How much farther than is usual (0.007 mm) moves may lie from the outlines that they stand
+    /// for, mm.
+    pub coarse: f64,
     /// The most filament that melts, mm³/s; infinite when that is not known.
     pub volume_per_second: f64,
     /// The part as it was placed, in the frame of the part.
@@ -138,6 +144,8 @@ impl<'a> Verifier<'a> {
     #[must_use]
     pub fn new(setup: Setup<'a>) -> Self {
         let Setup { printer, dialect, filament_area, mesh, .. } = setup;
+        // The volume that the filament stands for.
+        let meant = filament_area / setup.multiplier;
         Self {
             replay: Replay::new(printer, dialect),
             findings: Findings::default(),
@@ -153,9 +161,9 @@ impl<'a> Verifier<'a> {
             continuity: Continuity::default(),
             heat: Heat::new(printer),
             surface: Surface::new(printer),
-            flow: Flow::new(printer, filament_area, setup.volume_per_second),
-            volume: Volume::new(filament_area, printer.nozzle_diameter),
-            deposit: Deposit::new(printer),
+            flow: Flow::new(printer, meant, setup.volume_per_second / setup.multiplier),
+            volume: Volume::new(meant, printer.nozzle_diameter),
+            deposit: Deposit::new(printer, setup.coarse),
             watch: setup.thorough.then(|| Watch::new(&setup)),
             part: mesh.map(Part::new),
             setup,

@@ -6,8 +6,10 @@
 
 use nalgebra::Point3;
 
+use super::marlin::Marlin;
 use super::number::{quantum, value};
-use super::speed_word::SpeedWord;
+use super::speed_word::{SpeedWord, Way};
+use crate::profile::Printer;
 use crate::program::{BedTurn, Joints, Move};
 
 /// In which coordinates a move between two lines of the program is straight.
@@ -101,7 +103,7 @@ pub const RRF_POLAR: Dialect = ideal_plane("rrf-polar", SpeedWord::Words);
 
 /// Marlin with `POLAR`.
 pub const MARLIN_POLAR: Dialect =
-    ideal_plane("marlin-polar", SpeedWord::MarlinPolar { printable_radius: 82.0 });
+    ideal_plane("marlin-polar", SpeedWord::MarlinPolar(Marlin::EXAMPLE));
 
 /// grblHAL with `POLAR_ROBOT`.
 pub const GRBLHAL_POLAR: Dialect = ideal_plane("grblhal-polar", SpeedWord::Words);
@@ -137,13 +139,27 @@ impl Dialect {
         ALL.into_iter().find(|dialect| dialect.name == name)
     }
 
-    /// Returns the dialect as a firmware set up for a bed of this radius (mm) speaks it.
+    /// Returns the dialect as a firmware that is set up for this printer speaks it.
     #[must_use]
-    pub fn on_bed(mut self, radius: f64) -> Self {
-        if let SpeedWord::MarlinPolar { printable_radius } = &mut self.speed {
-            *printable_radius = radius;
+    pub fn on(mut self, printer: &Printer) -> Self {
+        if let SpeedWord::MarlinPolar(marlin) = &mut self.speed {
+            *marlin = Marlin::of(printer);
         }
         self
+    }
+
+    /// Returns what the speed word of a move from `from` to `to` depends on, when the nozzle runs
+    /// `path` mm over the part and `filament` mm are fed.
+    #[must_use]
+    pub fn way(&self, from: &Joints, to: &Joints, path: f64, filament: f64) -> Way {
+        let ends = match self.space {
+            Space::IdealPlane => [ideal(from), ideal(to)],
+            Space::Joints | Space::Part => [[0.0; 2]; 2],
+        };
+        let rise = to.z - from.z;
+        let [x, y] = [0, 1].map(|k| ends[1][k] - ends[0][k]);
+        let turn = to.turn.radians() - from.turn.radians();
+        Way { path, words: x.hypot(y).hypot(rise), filament, turn, ends, rise }
     }
 
     /// Returns whether `G92` may set the count of this word: the bed's, where it is kept short.

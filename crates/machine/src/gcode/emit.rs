@@ -75,7 +75,7 @@ impl<W: Write> Emitter<W> {
     /// Returns an emitter for a printer that stands at home, whose bed heights and play are
     /// corrected for.
     pub fn for_printer(out: W, dialect: Dialect, printer: &Printer) -> Self {
-        let dialect = dialect.on_bed(printer.rail.max);
+        let dialect = dialect.on(printer);
         Self { correction: Correction::of(printer, dialect), ..Self::new(out, dialect) }
     }
 
@@ -224,19 +224,7 @@ impl<W: Write> Emitter<W> {
 
     /// Appends the speed word, where it is not still the same.
     fn speed(&mut self, motion: &Move, target: [i64; 3], plane_moved: bool) {
-        let words = if self.dialect.speed.is_along_words() {
-            self.words_apart(motion, target, plane_moved)
-        } else {
-            0.0
-        };
-        let turn = self.turn.map_or(0.0, |last| motion.to.turn.radians() - last.radians());
-        let way = Way {
-            path: motion.path,
-            words,
-            filament: motion.filament,
-            turn: if plane_moved { turn } else { 0.0 },
-            radius: motion.to.s.abs(),
-        };
+        let way = self.way(motion, target, plane_moved);
         let word = self.dialect.speed.word(&way, motion.duration);
         // A tenth of mm/min is fine for speeds; inverse times of long moves are small numbers.
         let decimals = if self.dialect.speed.is_of_one_move() && word < 600.0 {
@@ -255,18 +243,36 @@ impl<W: Write> Emitter<W> {
         }
     }
 
-    /// How far the words of a move are from those before, mm.
-    fn words_apart(&self, motion: &Move, target: [i64; 3], plane_moved: bool) -> f64 {
-        let known = self.position.filter(|last| last[0] != i64::MIN);
-        let apart = |k: usize| known.map(|last| value(target[k] - last[k], NEAR_AXIS_DECIMALS));
-        let across = match (plane_moved, apart(0), apart(1)) {
-            (true, Some(x), Some(y)) => Some(x.hypot(y)),
-            (true, ..) => None,
-            (false, ..) => Some(0.0),
+    /// What the speed word depends on.
+    fn way(&self, motion: &Move, target: [i64; 3], plane_moved: bool) -> Way {
+        let mut way = Way {
+            path: motion.path,
+            words: 0.0,
+            filament: motion.filament,
+            turn: 0.0,
+            ends: [[0.0; 2]; 2],
+            rise: 0.0,
         };
-        let rise = self.position.map_or(0.0, |last| value(target[2] - last[2], MM_DECIMALS));
-        // Where nothing is known of the begin the planned path is the best guess.
-        across.map_or(motion.path, |across| across.hypot(rise))
+        if !self.dialect.speed.is_along_words() {
+            return way;
+        }
+        let plane = |words: [i64; 3]| [0, 1].map(|k| value(words[k], NEAR_AXIS_DECIMALS));
+        let known = self.position.filter(|last| last[0] != i64::MIN);
+        way.rise = self.position.map_or(0.0, |last| value(target[2] - last[2], MM_DECIMALS));
+        way.words = match known {
+            _ if !plane_moved => way.rise.abs(),
+            Some(last) => {
+                way.ends = [plane(last), plane(target)];
+                let apart = |k: usize| value(target[k] - last[k], NEAR_AXIS_DECIMALS);
+                apart(0).hypot(apart(1)).hypot(way.rise)
+            }
+            // Where nothing is known of the begin the planned path is the best guess.
+            None => motion.path,
+        };
+        if let Some(last) = self.turn.filter(|_| plane_moved && known.is_some()) {
+            way.turn = motion.to.turn.radians() - last.radians();
+        }
+        way
     }
 
     /// Sets the count of the bed back by whole turns where it has grown too large for the firmware;

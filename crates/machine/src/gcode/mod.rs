@@ -3,6 +3,7 @@
 mod correction;
 pub mod dialect;
 mod emit;
+pub mod marlin;
 mod number;
 mod parse;
 pub mod speed_word;

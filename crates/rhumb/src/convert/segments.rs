@@ -138,6 +138,7 @@ impl Foreign {
             filament: stroke.filament,
             feed: Feed::mm_per_s(stroke.speed),
             duration: if stroke.speed > 0.0 { way / stroke.speed } else { 0.0 },
+            is_paced: false,
         }
     }
 }

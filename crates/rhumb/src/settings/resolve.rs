@@ -94,7 +94,7 @@ impl Job {
         let mut printer = printer(&get);
         let dialect = Dialect::by_name(get.text("dialect"))
             .ok_or_else(|| conflict("there is no such dialect", get.text("dialect")))?
-            .on_bed(printer.rail.max);
+            .on(&printer);
         suit(&mut printer, &dialect)?;
         let tolerances = Tolerances::new(get.number("simplify_mm"), get.number("chord_mm"))
             .map_err(|error| Failure::new("ConfigConflict", error.to_string()))?;

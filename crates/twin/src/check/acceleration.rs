@@ -12,7 +12,9 @@
 //!
 //! Moves of filament or lift alone are time in which bed and carriage stand still. Homing, dwells
 //! and waits for heat bring everything to rest, as do begin and end of the program: to rest and
-//! from rest the half of a segment is available. Allowed on top is what
+//! from rest the half of a segment is available. Where a firmware runs a line at a pace of its own
+//! and itself sees to what the axes can follow, its `F` says nothing, and the judging begins anew
+//! behind it. Allowed on top is what
 //! [rounding](crate::rounding) can do to the two means and to the time. mm, radians, seconds.
 
 use machine::profile::Printer;
@@ -37,7 +39,8 @@ pub(crate) struct Acceleration {
 struct Axis {
     limit: f64,
     sudden: f64,
-    last: Run,
+    /// `None` where nothing is known of it.
+    last: Option<Run>,
     faster: Stretch,
     slower: Stretch,
     greatest: f64,
@@ -88,6 +91,11 @@ impl Acceleration {
             return;
         }
         let place = Place::end_of(segment);
+        if segment.is_paced {
+            self.last = Some(place);
+            (self.bed, self.rail) = (self.bed.unknown(), self.rail.unknown());
+            return;
+        }
         let run = |change: f64, last_place: f64| {
             let is_still = segment.path == 0.0;
             let off = if is_still { 0.0 } else { last_place };
@@ -152,12 +160,18 @@ impl Acceleration {
 
 impl Axis {
     fn new(limit: f64, sudden: f64) -> Self {
-        let (last, none) = (Run::default(), Stretch::default());
+        let (last, none) = (Some(Run::default()), Stretch::default());
         Self { limit, sudden, last, faster: none, slower: none, greatest: 0.0 }
     }
 
+    /// The same when nothing is known of how it ran last.
+    fn unknown(self) -> Self {
+        let none = Stretch::default();
+        Self { last: None, faster: none, slower: none, ..self }
+    }
+
     fn next(&mut self, run: Run) -> Option<Broken> {
-        let last = std::mem::replace(&mut self.last, run);
+        let last = self.last.replace(run)?;
         let time = last.half + run.half;
         if time == 0.0 {
             return None;
@@ -255,6 +269,21 @@ mod tests {
         printer.bed_jerk = 0.0;
         printer.bed.acceleration = 15.0;
         assert!(!bed(&printer, &zigzag).is_empty());
+    }
+
+    #[test]
+    fn a_line_at_the_firmwares_own_pace_is_not_judged() {
+        let run = |is_paced: bool| {
+            let (mut check, mut findings) = (Acceleration::new(&printer()), Findings::default());
+            for (from, to) in [(20.0, 25.0), (25.0, 26.0), (26.0, 21.0)] {
+                let mut segment = polar_segment([from, 0.0], [to, 0.0], 40.0);
+                segment.is_paced = is_paced && from == 25.0;
+                check.segment(&segment, &Doubt::of(&segment), &mut findings);
+            }
+            check.rest(&mut findings);
+            findings.kept().len()
+        };
+        assert_eq!((run(false), run(true)), (1, 0));
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub const NAME: &str = "deposit";
 pub const STICK_OUT: f64 = 0.02;
 
 /// What is added for the places of the text, mm: chord (0.005), simplification (0.002), the last
-/// places (0.001), and half the step of `;WIDTH:` (0.005).
+/// places (0.001), and half the step of `;WIDTH:` (0.005). Coarser tolerances come on top.
 pub const SLACK: f64 = 0.013;
 
 /// Beads farther out than this are said to lie where the part is not, mm.
@@ -80,15 +80,18 @@ pub(crate) struct Deposit {
     top: f64,
     /// Half the thickness of the layer, mm.
     half_height: f64,
+    /// What lines may lie farther off than is usual, mm.
+    coarse: f64,
     /// Whether the layer can be judged.
     is_sound: bool,
 }
 
 impl Deposit {
-    /// Returns the check for this printer.
+    /// Returns the check for this printer, of a program whose lines may lie so much farther off than
+    /// is usual, mm.
     #[must_use]
-    pub(crate) fn new(printer: &Printer) -> Self {
-        Self { alignment: printer.alignment, ..Self::default() }
+    pub(crate) fn new(printer: &Printer, coarse: f64) -> Self {
+        Self { alignment: printer.alignment, coarse, ..Self::default() }
     }
 
     /// Begins a layer.
@@ -156,7 +159,7 @@ impl Deposit {
         let probes: Vec<Point2<f64>> = self
             .samples
             .iter()
-            .flat_map(|sample| [1.0, -1.0].map(|sign| sample.probe(sign).xy()))
+            .flat_map(|sample| [1.0, -1.0].map(|sign| sample.probe(sign, self.coarse).xy()))
             .collect();
         let windings = section.windings(&probes);
         for (sample, windings) in self.samples.iter().zip(windings.chunks(2)) {
@@ -179,13 +182,14 @@ impl Deposit {
                 p - self.family.normal(&p) * self.half_height
             };
             let is_outside = |aside: f64| solid.columns.winding(&at(aside)) == 0;
-            let Some(sign) = [1.0, -1.0].into_iter().find(|sign| is_outside(sample.inner() * sign))
+            let Some(sign) =
+                [1.0, -1.0].into_iter().find(|sign| is_outside(sample.inner(self.coarse) * sign))
             else {
                 continue;
             };
             let edge = at(sign * sample.half_width);
             let out = solid.nearest.distance(&edge, FAR_OUT);
-            if !exceeds(out, STICK_OUT + SLACK) {
+            if !exceeds(out, STICK_OUT + SLACK + self.coarse) {
                 continue;
             }
             let severity = if exceeds(out, 2.0 * self.half_height) {
@@ -215,12 +219,12 @@ impl Deposit {
 
 impl Sample {
     /// How far from the middle line the mesh is asked, mm.
-    fn inner(&self) -> f64 {
-        (self.half_width - STICK_OUT - SLACK).max(0.0)
+    fn inner(&self, coarse: f64) -> f64 {
+        (self.half_width - STICK_OUT - SLACK - coarse).max(0.0)
     }
 
-    fn probe(&self, sign: f64) -> Point3<f64> {
-        self.at(sign * self.inner())
+    fn probe(&self, sign: f64, coarse: f64) -> Point3<f64> {
+        self.at(sign * self.inner(coarse))
     }
 
     fn at(&self, aside: f64) -> Point3<f64> {

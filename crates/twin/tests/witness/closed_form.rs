@@ -32,6 +32,8 @@ fn judged(printer: &Printer) -> Verdict {
         printer,
         dialect: machine::gcode::dialect::POLAR,
         filament_area: FILAMENT_AREA,
+        multiplier: 1.0,
+        coarse: 0.0,
         volume_per_second: f64::INFINITY,
         mesh: None,
         solid: false,

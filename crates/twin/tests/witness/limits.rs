@@ -78,6 +78,8 @@ fn findings(run: &Run, printer: &Printer) -> Vec<String> {
         printer,
         dialect,
         filament_area: FILAMENT_AREA,
+        multiplier: 1.0,
+        coarse: 0.0,
         volume_per_second: f64::INFINITY,
         mesh: None,
         solid: false,

@@ -14,6 +14,8 @@ fn judge(lines: &[Vec<u8>]) -> usize {
             printer: &printer,
             dialect,
             filament_area: FILAMENT_AREA,
+            multiplier: 1.0,
+            coarse: 0.0,
             volume_per_second: f64::INFINITY,
             mesh: Some(&mesh),
             solid: true,
