@@ -114,13 +114,8 @@ fn arguments(random: &mut Random) -> Vec<String> {
     all
 }
 
-/// Share of runs that may be refused by rhumb's own check, with nothing written: faults of the planner
-/// that are known, most of them bed speeds near the axis in `marlin-polar` and odd settings of walls.
-/// It is to become zero.
-const MOST_REFUSED: f64 = 0.3;
-
-/// Whether a run ended well; what is wrong otherwise. Where more is asked of the melt than it gives
-/// (check `flow`), status 1 and the finding are the warning.
+/// Whether a run ended well; what is wrong otherwise. What the check finds must have been told before,
+/// by a warning; a program that it refuses is a fault of the planner.
 fn fault(code: Option<i32>, out: &str, err: &str) -> Option<String> {
     match code {
         // Refused for a reason: model and machine, settings that do not go together, or a budget.
@@ -129,9 +124,7 @@ fn fault(code: Option<i32>, out: &str, err: &str) -> Option<String> {
             let report: Value = serde_json::from_str(out).ok()?;
             let findings = report["verify"]["findings"].as_array()?;
             let is_explained = report["warnings"].as_array().is_some_and(|all| !all.is_empty());
-            let is_flow = findings.iter().all(|found| found["check"] == "flow");
-            let is_told = is_explained || !findings.is_empty() && is_flow;
-            let is_fine = if code == Some(0) { findings.is_empty() } else { is_told };
+            let is_fine = if code == Some(0) { findings.is_empty() } else { is_explained };
             (!is_fine).then(|| format!("{findings:?} {:?}", report["warnings"]))
         }
         _ => Some(format!("{code:?} {err}")),
@@ -145,7 +138,7 @@ fn number(name: &str, otherwise: u64) -> u64 {
 #[test]
 fn any_settings_with_any_model_give_a_sound_program_or_a_reason() {
     let from = number("RHUMB_SWEEP_FROM", 0);
-    let (mut faults, mut n_printed, mut n_refused) = (Vec::new(), 0, 0);
+    let (mut faults, mut n_printed) = (Vec::new(), 0);
     let count = number("RHUMB_SWEEP", 40);
     for seed in from..from + count {
         let mut random = Random(seed);
@@ -157,13 +150,10 @@ fn any_settings_with_any_model_give_a_sound_program_or_a_reason() {
         all.extend(more.iter().cloned());
         let ran = scratch.run(&all);
         n_printed += u64::from(matches!(ran.code, Some(0 | 1)));
-        n_refused += u32::from(ran.code == Some(9));
         if let Some(fault) = fault(ran.code, &ran.out, &ran.err) {
             faults.push(format!("seed {seed}: {fault}\n  {}", more.join(" ")));
         }
     }
-    let most = MOST_REFUSED * count as f64;
-    assert!(f64::from(n_refused) <= most, "{n_refused} of {count} fail their own check");
     assert!(n_printed * 2 > count, "only {n_printed} of {count} are printed");
     assert!(faults.is_empty(), "{} of {count}:\n{}", faults.len(), faults.join("\n"));
 }

@@ -67,6 +67,8 @@ pub struct Totals {
     pub bed_turns: f64,
     /// What was laid with less flow than is good.
     pub slow_flow: SlowFlow,
+    /// Length of the beads that the firmware runs at a pace of its own, mm.
+    pub paced: f64,
 }
 
 impl Totals {
@@ -257,6 +259,8 @@ impl<'a> Planner<'a> {
         self.pace = pace;
         let dialect = &self.params.resample.dialect;
         let taken = taken(&legs, start, &times, dialect);
+        self.totals.paced += taken.paced;
+        let taken = taken.times;
         self.totals.time += time::estimate(&legs, &travels, &taken, self.printer, dialect.space);
         for (leg, travel) in legs.iter().zip(&travels) {
             self.count(leg, travel.axes[1]);

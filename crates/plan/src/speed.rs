@@ -24,6 +24,7 @@ use machine::profile::Printer;
 use machine::program::Joints;
 
 use crate::resample::Leg;
+use crate::route::Kind;
 
 /// What the speed of a program must respect.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -143,27 +144,36 @@ pub(crate) fn travels(legs: &[Leg], start: Joints) -> Vec<Travel> {
         .collect()
 }
 
-/// Returns how long the firmware will take for each leg, s: as planned, but where it sets the pace
-/// itself.
+/// How long the firmware will take for each leg.
+pub(crate) struct Taken<'a> {
+    /// As planned, but where the firmware sets the pace itself, s.
+    pub(crate) times: Cow<'a, [f64]>,
+    /// Length of the beads of which it does, mm.
+    pub(crate) paced: f64,
+}
+
+/// Returns how long the firmware will take for each leg that begins where the one before ends.
 pub(crate) fn taken<'a>(
     legs: &[Leg],
     start: Joints,
     planned: &'a [f64],
     dialect: &Dialect,
-) -> Cow<'a, [f64]> {
+) -> Taken<'a> {
     if !matches!(dialect.speed, SpeedWord::MarlinPolar(_)) {
-        return planned.into();
+        return Taken { times: planned.into(), paced: 0.0 };
     }
-    let mut from = start;
-    let taken = legs.iter().zip(planned).map(|(leg, &duration)| {
+    let (mut from, mut paced) = (start, 0.0);
+    let times = legs.iter().zip(planned).map(|(leg, &duration)| {
         let way = dialect.way(&from, &leg.to, leg.path, leg.filament);
         from = leg.to;
         if !dialect.speed.sets_the_pace(&way) {
             return duration;
         }
+        paced += if leg.kind == Kind::Print { leg.path } else { 0.0 };
         dialect.speed.duration(&way, dialect.speed.word(&way, duration))
     });
-    taken.collect()
+    let times = times.collect();
+    Taken { times, paced }
 }
 
 /// What the axes of the law do in a leg.
@@ -368,7 +378,7 @@ fn slowed(distance: f64, other: f64, other_duration: f64, acceleration: f64) -> 
 mod tests {
     use super::*;
     use crate::resample::{ResampleParams, Resampler};
-    use crate::route::{Kind, Stroke};
+    use crate::route::Stroke;
     use crate::testing::printer;
     use nalgebra::Point3;
 

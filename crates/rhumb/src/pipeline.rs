@@ -376,6 +376,16 @@ impl Printed {
                 ),
             );
         }
+        if self.totals.paced > 0.0 {
+            warn(
+                "FirmwarePace",
+                format!(
+                    "{:.0} mm of beads lie so near the axis that the firmware runs them as fast as \
+                     its axes can, whatever F says; with --place the part can stand beside it",
+                    self.totals.paced.max(1.0)
+                ),
+            );
+        }
         if self.adhesion_out_of_reach > 0 {
             warn(
                 "AdhesionLeftOut",

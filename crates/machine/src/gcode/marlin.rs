@@ -44,9 +44,6 @@ const LEAST_PIECE_MM: f64 = 0.5;
 /// `DEFAULT_SEGMENTS_PER_SECOND`.
 const PIECES_PER_SECOND: f64 = 180.0;
 
-/// Times that word and number of pieces are matched; each depends on the other.
-const MOST_MATCHES: usize = 4;
-
 /// How long a line takes: `words / F`, and what is beyond the reach of `F`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Law {
@@ -83,21 +80,23 @@ impl Marlin {
     /// within the fast radius it is the speed that is wanted, for what that is worth.
     pub(super) fn speed(&self, way: &Way, duration: f64) -> f64 {
         let mut count = most_pieces(way);
-        let mut least = way.words / duration;
-        for _ in 0..MOST_MATCHES {
+        loop {
             let law = self.law(way, count);
             if law.obeying == 0.0 {
-                return least;
+                return way.words / duration;
             }
             let speed = law.words / (duration * law.obeying);
-            least = least.min(speed);
             let needed = pieces(way, speed);
             if needed == count {
                 return speed;
             }
+            if needed > count {
+                // With more pieces it would be too slow, and with this many the speed is too high for
+                // them: the highest that has one more.
+                return PIECES_PER_SECOND * way.words / f64::from(count + 1);
+            }
             count = needed;
         }
-        least
     }
 
     /// Returns how long a line at this speed (mm/s) takes, s.

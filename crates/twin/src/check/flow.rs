@@ -10,7 +10,8 @@
 //!   flat floor are. So may those of the first planar layer on curved ones, which fills the wedges
 //!   that these leave below it; along their normal, that is.
 //!
-//! No line asks for more volume in a second than melts.
+//! No line asks for more volume in a second than melts, where its speed is its own: at the pace of a
+//! firmware, within a few mm of the axis, the top speed is only a bound, which ramps never reach.
 //!
 //! Lines that go round the axis are shorter or longer than what they stand for, and are not judged.
 //! mm.
@@ -150,7 +151,7 @@ impl Flow {
 
     /// Judges the volume in a second.
     fn melts(&self, segment: &Segment, doubt: &Doubt, findings: &mut Findings) {
-        if !segment.extrudes() || segment.duration <= 0.0 {
+        if !segment.extrudes() || segment.duration <= 0.0 || segment.is_paced {
             return;
         }
         let rate = segment.filament * self.filament_area / segment.duration;
