@@ -138,6 +138,16 @@ impl Family {
         }
     }
 
+    /// Returns the thickness that programs announce for a layer, per mm of level: along the normal,
+    /// and of caps, which thin outwards, on the axis.
+    #[must_use]
+    pub fn announced_per_level(&self) -> f64 {
+        match *self {
+            Self::Planar | Self::Spherical { .. } | Self::Caps { .. } => 1.0,
+            Self::Conical { slope } => 1.0 / slope.hypot(1.0),
+        }
+    }
+
     /// Returns what it is called.
     #[must_use]
     pub fn name(&self) -> &'static str {
@@ -224,6 +234,10 @@ mod tests {
             assert!((gradient.normalize() - family.normal(&p)).norm() < 1e-8, "{family:?}");
             let thickness = 1.0 / gradient.norm();
             assert!((thickness - family.thickness_per_level(&p)).abs() < 1e-8, "{family:?}");
+            // Half a µm beside the axis, where cones have a direction.
+            let near = Point3::new(5e-4, 0.0, 15.0);
+            let announced = family.announced_per_level();
+            assert!((announced - family.thickness_per_level(&near)).abs() < 1e-8, "{family:?}");
         }
     }
 }

@@ -87,8 +87,15 @@ pub(crate) struct Footing {
     pub(crate) taken: u32,
     /// Where its own stroke lies already: under the round end of the piece before.
     pub(crate) own: u32,
-    /// The empty space under it, mm³.
-    pub(crate) hollow: f64,
+}
+
+/// Empty space under a cell of a piece that nothing of its own stroke covers yet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Opening {
+    /// Halfway down the layer below: what is missing there if the place belongs to the part.
+    pub(crate) below: Point3<f64>,
+    /// How far down the empty space goes, mm.
+    pub(crate) depth: f64,
 }
 
 impl Footing {
@@ -143,6 +150,9 @@ pub(crate) trait Underside {
 /// Half: below, the bead is squeezed out by half; above, it still touches what sags.
 const TOUCHING: f64 = 0.5;
 
+/// From the upper side of a bead to the middle of the layer below, in thicknesses.
+pub(crate) const HALFWAY_DOWN: f64 = 1.5;
+
 /// Heights of what was laid. See the [module](self).
 #[derive(Debug)]
 pub(crate) struct Pile {
@@ -153,6 +163,8 @@ pub(crate) struct Pile {
     tiles: Vec<Option<Box<Tile>>>,
     greatest: f64,
     shapes: Vec<Shape>,
+    /// Those of the last piece.
+    openings: Vec<Opening>,
 }
 
 impl Pile {
@@ -162,7 +174,14 @@ impl Pile {
         let half = (reach / tile).ceil().max(1.0);
         let side = 2 * half as usize;
         let tiles = vec![None; side * side];
-        Self { side, corner: -half * tile, tiles, greatest: 0.0, shapes: Vec::new() }
+        Self {
+            side,
+            corner: -half * tile,
+            tiles,
+            greatest: 0.0,
+            shapes: Vec::new(),
+            openings: Vec::new(),
+        }
     }
 
     /// Returns the greatest height, mm.
@@ -170,8 +189,14 @@ impl Pile {
         self.greatest
     }
 
+    /// Returns where the last piece came to lie over empty space, each place once in a stroke.
+    pub(crate) fn openings(&self) -> &[Opening] {
+        &self.openings
+    }
+
     /// Lays a piece, and returns what it came to lie on.
     pub(crate) fn lay(&mut self, piece: &Piece) -> Footing {
+        self.openings.clear();
         let [from, to] = piece.ends;
         let down = piece.family.normal(&nalgebra::center(&from, &to)) * -piece.thickness;
         let single = |v: [f64; 3]| v.map(|c| c as f32);
@@ -201,8 +226,17 @@ impl Pile {
                     family => family.height(family.level(&foot), at.coords.norm()),
                 };
                 if top.is_finite() {
+                    let own = footing.own;
                     self.lay_cell([column, row], top, piece, &mut footing);
-                    self.rest(&(Point3::new(at.x, at.y, top) + down), piece, &mut footing);
+                    let top = Point3::new(at.x, at.y, top);
+                    if let Some(depth) = self.gap_under(&(top + down), piece) {
+                        if footing.own == own {
+                            let below = top + down * HALFWAY_DOWN;
+                            self.openings.push(Opening { below, depth });
+                        }
+                    } else {
+                        footing.resting += 1;
+                    }
                 }
             }
         }
@@ -240,18 +274,14 @@ impl Pile {
         self.greatest = self.greatest.max(top);
     }
 
-    /// Looks at what lies under the bottom of a bead.
-    fn rest(&self, bottom: &Point3<f64>, piece: &Piece, footing: &mut Footing) {
+    /// How far below the bottom of a bead the next thing lies, mm; `None` where it rests.
+    fn gap_under(&self, bottom: &Point3<f64>, piece: &Piece) -> Option<f64> {
         let (column, row) = (self.index(bottom.x), self.index(bottom.y));
         let tile = &self.tiles[row / TILE * self.side + column / TILE];
         let cell = tile.as_ref().map_or(BARE, |tile| tile.cells[row % TILE * TILE + column % TILE]);
         let under = if cell.layer == piece.layer { cell.under } else { cell.top };
         let gap = bottom.z - f64::from(under);
-        if gap <= TOUCHING * piece.thickness {
-            footing.resting += 1;
-        } else {
-            footing.hollow += gap * CELL * CELL;
-        }
+        (gap > TOUCHING * piece.thickness).then_some(gap)
     }
 
     /// Returns the true shape of a piece.
@@ -349,7 +379,7 @@ mod tests {
     fn beads_rest_on_the_bed_and_on_each_other() {
         let mut pile = Pile::new(50.0);
         let first = pile.lay(&piece(0.0, 0.2, 0, 0));
-        assert_eq!((first.share(), first.taken, first.hollow), (1.0, 0, 0.0));
+        assert_eq!((first.share(), first.taken, pile.openings()), (1.0, 0, [].as_slice()));
         let covered = f64::from(first.covered) * CELL * CELL;
         let area = 10.0 * 0.45 + std::f64::consts::PI * 0.225 * 0.225;
         assert!((covered / area - 1.0).abs() < 0.15, "{covered} {area}");
@@ -359,7 +389,13 @@ mod tests {
         assert!((beside.share() - 0.55).abs() < 0.12, "{}", beside.share());
         let far = pile.lay(&piece(3.0, 0.6, 2, 3));
         assert_eq!(far.share(), 0.0);
-        assert!((far.hollow - f64::from(far.covered) * CELL * CELL * 0.4).abs() < 1e-6);
+        assert_eq!(pile.openings().len(), far.covered as usize);
+        for opening in pile.openings() {
+            assert!((opening.depth - 0.4).abs() < 1e-6 && (opening.below.z - 0.3).abs() < 1e-9);
+        }
+        // The same line once more covers nothing new.
+        pile.lay(&piece(3.0, 0.6, 2, 3));
+        assert_eq!(pile.openings(), []);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use crate::check::overlap::Overlap;
 use crate::check::support::{Follow, PIECE, Step, Support};
 use crate::columns::Columns;
 use crate::finding::{Findings, Place};
-use crate::pile::{Piece, Pile};
+use crate::pile::{HALFWAY_DOWN, Opening, Piece, Pile};
 use crate::replay::LayerMark;
 use crate::rounding;
 use crate::segment::Segment;
@@ -174,9 +174,12 @@ impl<'a> Watch<'a> {
         if segment.role != Role::GapFill {
             self.overlap.piece(&step, findings);
         }
-        if let Some(hollow) = &mut self.hollow {
-            hollow.piece(&step);
-        }
+        let Some(hollow) = &mut self.hollow else { return };
+        let part = self.part.as_ref();
+        // Where the layer below is as thick; without a mesh, what the bead is for tells.
+        let belongs =
+            |opening: &&Opening| part.map_or(is_inside, |part| part.winding(&opening.below) != 0);
+        hollow.piece(&step, self.pile.openings().iter().filter(belongs));
     }
 
     /// Returns whether the place halfway down the layer below belongs to the part; without a mesh,
@@ -185,7 +188,7 @@ impl<'a> Watch<'a> {
         let Some(part) = &self.part else { return role == Role::InternalInfill };
         let middle = center(&ends[0], &ends[1]);
         let normal = self.mark.and_then(|mark| mark.family).unwrap_or_default().normal(&middle);
-        part.winding(&(middle - normal * (1.5 * self.thickness))) != 0
+        part.winding(&(middle - normal * (HALFWAY_DOWN * self.thickness))) != 0
     }
 
     /// The thickness of a bead of the announced width that takes the filament of a segment, mm.

@@ -1,14 +1,14 @@
 //! Is a solid print solid?
 //!
-//! Where a bead is laid over empty space (see `pile`) and that space belongs to the part,
-//! the space is hollow. A layer may leave [`MOST_HOLLOW`] hollow: the corners that no round bead
+//! Where a bead is laid over empty space (see `pile`) and the place halfway down the layer below
+//! belongs to the part, the space is hollow; each place counts once in a line. A layer may leave [`MOST_HOLLOW`] hollow: the corners that no round bead
 //! reaches. mm³, part frame.
 
 use nalgebra::center;
 
 use crate::check::support::Step;
 use crate::finding::{Findings, Place};
-use crate::pile::CELL;
+use crate::pile::{CELL, Opening};
 
 /// The name of this check.
 pub const NAME: &str = "coverage";
@@ -30,17 +30,17 @@ pub(crate) struct Hollow {
 }
 
 impl Hollow {
-    /// A bead goes on by a piece.
-    pub(crate) fn piece(&mut self, step: &Step) {
+    /// A bead goes on by a piece over these openings into the part.
+    pub(crate) fn piece<'a>(&mut self, step: &Step, openings: impl Iterator<Item = &'a Opening>) {
         let footing = &step.footing;
-        self.covered += u64::from(footing.covered);
-        let open = footing.covered - footing.resting;
-        if open == 0 || !step.is_inside {
-            return;
+        self.covered += u64::from(footing.covered - footing.own);
+        let mut open = 0;
+        for opening in openings {
+            open += 1;
+            self.sum += opening.depth * CELL * CELL;
         }
-        self.sum += footing.hollow;
         self.open += u64::from(open);
-        if self.worst.is_none_or(|(most, _)| open > most) {
+        if open > 0 && self.worst.is_none_or(|(most, _)| open > most) {
             let at = center(&step.ends[0], &step.ends[1]);
             let place = Place { line: step.line, layer: step.layer, at: Some(at) };
             self.worst = Some((open, place));
@@ -78,24 +78,27 @@ mod tests {
     use nalgebra::Point3;
 
     #[test]
-    fn holes_are_found_and_what_is_outside_is_none() {
+    fn holes_are_found_and_what_is_laid_twice_counts_once() {
         let (mut check, mut findings) = (Hollow::default(), Findings::default());
         let ends = [Point3::origin(), Point3::new(0.5, 0.0, 0.0)];
-        let mut layer = |open: u32, is_inside: bool| {
+        let mut layer = |open: u32, own: u32| {
             for line in 0..200 {
                 let open = if line % 10 == 0 { open } else { 0 };
                 let footing = Footing {
-                    covered: 25,
-                    resting: 25 - open,
-                    hollow: f64::from(open) * 0.001,
+                    covered: 25 + own,
+                    own,
+                    resting: 25 + own - open,
                     ..Footing::default()
                 };
-                check.piece(&Step { line, layer: None, ends, footing, is_inside });
+                let step = Step { line, layer: None, ends, footing, is_inside: true };
+                let opening = Opening { below: Point3::origin(), depth: 0.1 };
+                check.piece(&step, vec![opening; open as usize].iter());
             }
             check.end_of_layer(&mut findings);
             findings.kept().len()
         };
-        assert_eq!([layer(10, true), layer(25, false), layer(25, true)], [0, 0, 1]);
-        assert!((check.sum() - 20.0 * (0.01 + 0.025)).abs() < 1e-12);
+        // 4 % are open, then 10 %; ground that a line covers again makes neither more nor less.
+        assert_eq!([layer(10, 0), layer(10, 100), layer(25, 0), layer(25, 100)], [0, 0, 1, 2]);
+        assert!((check.sum() - 20.0 * 0.1 * CELL * CELL * 70.0).abs() < 1e-12);
     }
 }

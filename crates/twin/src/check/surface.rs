@@ -134,8 +134,7 @@ impl Surface {
             // The first layer of a curved family is a wedge on what lies below.
             _ => return,
         };
-        let Some(at) = self.samples.first().map(|sample| sample.at) else { return };
-        let thickness = (level - below) * family.thickness_per_level(&at);
+        let thickness = (level - below) * family.announced_per_level();
         let steps = if family == Family::Planar { 1.0 } else { (thickness / height).round() };
         let off = (thickness - steps.max(1.0) * height).abs();
         let limit = OFF + rounding::LENGTH * steps.max(1.0);
@@ -207,6 +206,15 @@ mod tests {
         let levels = [8.0, 8.0 + step, 8.0 + 2.0 * step, 8.0 + 4.0 * step];
         let (none, worst) = found(Some(CONE), &levels, 0.0);
         assert!(none.is_empty() && worst < 1e-3, "{none:?} {worst}");
+    }
+
+    #[test]
+    fn caps_lie_their_thickness_apart_on_the_axis() {
+        // 12 mm out their normals lean by 37°.
+        let caps = Some(Family::Caps { radius: 20.0 });
+        assert!(found(caps, &[8.0, 8.2, 8.4, 9.0], 0.0).0.is_empty());
+        let along_normal = 0.2 / 0.8;
+        assert_eq!(found(caps, &[8.0, 8.0 + along_normal], 0.0).0.len(), 1);
     }
 
     #[test]
