@@ -5,9 +5,12 @@ use std::f64::consts::TAU;
 use geom::grid::mm;
 use geom::polyline::distance_to_segment;
 use geom::region::{Fill, Region, ring_sides};
+use mesh::topology::Solid;
 use nalgebra::{Point2, Vector2};
 use serde_json::Value;
-use slicer::chart::Chart;
+use slicer::chart::{Chart, carried};
+use slicer::section::Cutter;
+use slicer::surface::{Cone, LayerSurface};
 
 /// The vectors, from a `shared/vectors` folder beside the repository; `None` in a plain clone.
 fn vectors(name: &str) -> Option<Value> {
@@ -290,6 +293,26 @@ fn offsets_know_the_apex() {
                         "{name}, {degrees}°, {distance} mm: {p}, {to_border} mm from the border"
                     );
                 }
+            }
+        }
+    }
+}
+
+#[test]
+fn no_slivers_are_left_beside_the_apex() {
+    // A column whose side passes the axis, cut by cones with their apex beside its top.
+    let solid = Solid::new(mesh::shapes::steps());
+    for degrees in [15.0, 30.0, 45.0_f64] {
+        let cone = Cone::new(degrees.to_radians()).unwrap();
+        let step = cone.level_step(0.2);
+        for k in 20..48 {
+            let upper = 0.4 + step * f64::from(k);
+            let middle = upper - step / 2.0;
+            let section = Cutter::at_levels(&solid, &cone, vec![middle]).section(0, 0.002);
+            let region = carried(&cone, &section.region, middle, upper);
+            for island in cone.chart(upper).inset(&region, 0.225).islands() {
+                let area = Region::from_island(island.clone()).area();
+                assert!(area > 1e-3, "{degrees}°, layer {k}: an island of {area} mm²");
             }
         }
     }

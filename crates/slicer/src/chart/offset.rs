@@ -18,12 +18,12 @@
 //!
 //! On a plane all of this is [`geom::offset`] itself, unchanged.
 
-use geom::grid::{GridPoint, mm, snap};
+use geom::grid::{GridPoint, STEPS_PER_MM, mm, snap};
 use geom::offset::{
     ARC_TOLERANCE_MM, LEAST_SINE, LONGEST_MITER, MovedSides, OPENING_TOLERANCE_MM, ShortSides,
 };
 use geom::polyline::{distance_to_segment, share_nearest};
-use geom::region::{Fill, Region, Ring, signed_area};
+use geom::region::{Fill, Island, Region, Ring, ring_length, signed_area};
 use nalgebra::{Point2, Vector2};
 
 use super::{Chart, turned};
@@ -89,7 +89,11 @@ impl Chart {
             return region.clone();
         }
         let raw = self.raw_rings(region, shift, curves, ShortSides::LeftOut);
-        Region::from_grid_rings(&raw, Fill::Positive)
+        let moved = Region::from_grid_rings(&raw, Fill::Positive);
+        if moved.islands().iter().all(|island| is_wider_than_rounding(&island)) {
+            return moved;
+        }
+        moved.filtered(is_wider_than_rounding)
     }
 
     fn raw_rings(
@@ -117,6 +121,17 @@ impl Chart {
             Self::Sphere { radius } => 1.0 / (4.0 * radius * radius),
         }
     }
+}
+
+/// Whether an island is more than what rounding leaves of strips that lie against each other, as
+/// images that pass the apex of a cone to either side do.
+fn is_wider_than_rounding(island: &&Island) -> bool {
+    // Both sides of a strip are off by a grid step and more.
+    const ROUNDING_MM: f64 = 10.0 / STEPS_PER_MM;
+    let (area, perimeter) = island.iter().fold((0.0, 0.0), |(area, perimeter), ring| {
+        (area + signed_area(ring), perimeter + ring_length(ring))
+    });
+    2.0 * area > ROUNDING_MM * perimeter
 }
 
 /// How closely curves are followed.
