@@ -33,8 +33,9 @@ impl Resampler {
         if self.params.dialect.space != Space::Joints || strokes[0].kind != Kind::Print {
             return None;
         }
-        let run = 1 + strokes[1..].iter().take_while(|stroke| stroke.continues).count();
-        if run < 2 {
+        let continued = strokes[1..].iter().take(MOST_STROKES - 1);
+        let mut most = 1 + continued.take_while(|stroke| stroke.continues).count();
+        if most < 2 {
             return None;
         }
         let clearance = self.clear_radius(self.joints.z);
@@ -48,14 +49,21 @@ impl Resampler {
         if !self.may_follow(&target(&strokes[0])?, &target(&strokes[1])?) {
             return None;
         }
-        let targets: Vec<Target> =
-            strokes[..run.min(MOST_STROKES)].iter().map_while(target).collect();
-        // Twice as many as long as that goes well, then the exact number between.
-        let (mut good, mut bad) = (1, targets.len() + 1);
+        let mut places = strokes[..most].iter().map_while(target);
+        let mut targets: Vec<Target> = Vec::new();
+        // Twice as many as long as that goes well, then the exact number between. Most moves are a
+        // few strokes long, so the way ahead is not looked at before it is needed.
+        let (mut good, mut bad) = (1, most + 1);
         while good + 1 < bad {
-            let count =
-                if bad > targets.len() { (2 * good).min(targets.len()) } else { (good + bad) / 2 };
-            if self.follows(&targets[..count]) { good = count } else { bad = count }
+            let count = if bad > most { (2 * good).min(most) } else { (good + bad) / 2 };
+            targets.extend(places.by_ref().take(count.saturating_sub(targets.len())));
+            if targets.len() < count {
+                (most, bad) = (targets.len(), targets.len() + 1);
+            } else if self.follows(&targets[..count]) {
+                good = count;
+            } else {
+                bad = count;
+            }
         }
         if good < 2 {
             return None;
