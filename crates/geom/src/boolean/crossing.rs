@@ -42,7 +42,7 @@ pub(super) fn crossings(rings: &[Simple]) -> Option<Vec<Crossing>> {
             if other.bounds.min.x > chunk.bounds.max.x {
                 break;
             }
-            if chunk.bounds.meets(&other.bounds) {
+            if chunk.bounds.meets(&other.bounds) && !chunk.runs_on_in(other) {
                 add_crossings(rings, chunk, other, &mut found)?;
             }
         }
@@ -60,6 +60,43 @@ struct Chunk {
     ring: usize,
     first: usize,
     end: usize,
+    way: Way,
+}
+
+impl Chunk {
+    /// Whether it and `other`, the same or one that follows it, are parts of a line that runs one way:
+    /// such a line meets itself nowhere.
+    fn runs_on_in(&self, other: &Self) -> bool {
+        let is_next = self.end == other.first || other.end == self.first;
+        self.ring == other.ring
+            && self.way == other.way
+            && self.way != Way::Both
+            && (self.first == other.first || is_next)
+    }
+}
+
+/// Which way along x sides run.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Way {
+    Up,
+    Down,
+    Both,
+}
+
+impl Way {
+    fn of(points: &[GridPoint], last: GridPoint) -> Self {
+        let ends = points[1..].iter().chain([&last]);
+        let (mut up, mut down) = (true, true);
+        for (a, b) in points.iter().zip(ends) {
+            up &= a.x <= b.x;
+            down &= a.x >= b.x;
+        }
+        match (up, down) {
+            (true, false) => Self::Up,
+            (false, true) => Self::Down,
+            _ => Self::Both,
+        }
+    }
 }
 
 fn chunks(rings: &[Simple]) -> Vec<Chunk> {
@@ -72,7 +109,8 @@ fn chunks(rings: &[Simple]) -> Vec<Chunk> {
             let last = points[end % points.len()];
             bounds.min = GridPoint::new(bounds.min.x.min(last.x), bounds.min.y.min(last.y));
             bounds.max = GridPoint::new(bounds.max.x.max(last.x), bounds.max.y.max(last.y));
-            chunks.push(Chunk { bounds, ring, first, end });
+            let way = Way::of(&points[first..end], last);
+            chunks.push(Chunk { bounds, ring, first, end, way });
         }
     }
     chunks
