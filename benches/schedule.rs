@@ -9,6 +9,7 @@ use mesh::mesh::Mesh;
 use mesh::orient::{candidates, rate, rest};
 use mesh::place::placed;
 use mesh::topology::Solid;
+use mesh::weld::weld;
 use mesh::{flats, shapes, stl};
 use rhumb::failure::Failure;
 use rhumb::interrupt::Interrupt;
@@ -59,7 +60,9 @@ fn processor_ms() -> Option<f64> {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = Settings::defaults();
     let job = Job::resolve(&settings)?;
-    let mesh = model();
+    // As a slice sees it: vertices in the order of the file.
+    let bytes = stl::write(&model());
+    let (mesh, _) = weld(&stl::read(&bytes)?.0);
     writeln!(io::stdout(), "{} triangles", mesh.triangles.len())?;
 
     let ((rotation, _), rest_ms) = timed("rest", || rest(&mesh, &job.orient))?;
@@ -83,7 +86,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if std::env::args().any(|argument| argument == "--no-slice") {
         return Ok(());
     }
-    let bytes = stl::write(&mesh);
     drop((mesh, part));
     let (outcome, slice_ms) = timed("whole slice", || whole(&bytes, &settings, &job))?;
     let timings = outcome?;

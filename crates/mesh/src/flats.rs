@@ -66,7 +66,9 @@ impl Area {
     const UNIT_MM2: f64 = 1.0 / (1_u64 << 40) as f64;
 
     fn of(mm2: f64) -> Self {
-        Self((mm2 / Self::UNIT_MM2).round() as u128)
+        let units = mm2 * (1.0 / Self::UNIT_MM2) + 0.5;
+        // Numbers of 64 bits, up to 16 m², are quicker.
+        Self(if units < u64::MAX as f64 { u128::from(units as u64) } else { units as u128 })
     }
 
     fn mm2(self) -> f64 {
@@ -76,13 +78,22 @@ impl Area {
 
 /// Returns the flat faces, from the bed up; of two at one height the one that looks down is first.
 ///
-/// The cost is one pass over the facets and a sort of those that are nearly horizontal.
+/// The cost is one pass over the facets and a sort of the heights of those that are nearly
+/// horizontal.
 #[must_use]
 pub fn flats(mesh: &Mesh, params: &FlatParams) -> Vec<Flat> {
     let cosine = params.angle_rad.cos();
-    let facets = (0..mesh.triangles.len() as u32).into_par_iter();
-    let level = |facet| level(mesh, facet, cosine, params.depth_mm);
-    let facets = levels(facets.filter_map(level).collect());
+    let piece = |triangles: &[[u32; 3]]| {
+        let mut tally = Tally::default();
+        for corners in triangles {
+            if let Some(level) = level(mesh, corners, cosine, params.depth_mm) {
+                tally.add(level);
+            }
+        }
+        tally.levels
+    };
+    let pieces: Vec<_> = mesh.triangles.par_chunks(PIECE).map(piece).collect();
+    let facets = levels(pieces.concat());
     let one_run = |a: &Level, b: &Level| a.facing == b.facing && b.z - a.z <= params.depth_mm;
     let mut flats: Vec<Flat> =
         facets.chunk_by(one_run).filter_map(|run| face(run, params.depth_mm)).collect();
@@ -90,31 +101,71 @@ pub fn flats(mesh: &Mesh, params: &FlatParams) -> Vec<Flat> {
     flats
 }
 
+/// Facets of one piece of work.
+const PIECE: usize = 1 << 16;
+
 /// A facet that is nearly horizontal; `None` for others.
-fn level(mesh: &Mesh, facet: u32, cosine: f64, depth: f64) -> Option<Level> {
-    let corners = mesh.corners(facet);
+fn level(mesh: &Mesh, corners: &[u32; 3], cosine: f64, depth: f64) -> Option<Level> {
+    let corners = corners.map(|v| &mesh.vertices[v as usize]);
     let [a, b, c] = corners.map(|p| p.z);
-    // Most facets leave here.
+    // Most facets leave here, ...
     if a.max(b).max(c) - a.min(b).min(c) > 2.0 * depth {
         return None;
     }
     let twice = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-    let area = twice.norm() / 2.0;
+    let length = twice.norm();
+    // ... and most of the others here.
+    if !(length > 0.0 && twice.z.abs() >= length * cosine) {
+        return None;
+    }
     let facing = if twice.z < 0.0 { Facing::Down } else { Facing::Up };
-    let is_level = area > 0.0 && twice.z.abs() >= 2.0 * area * cosine;
-    is_level.then(|| Level { z: (a + b + c) / 3.0, area: Area::of(area), facing })
+    Some(Level { z: (a + b + c) / 3.0, area: Area::of(length / 2.0), facing })
+}
+
+/// Levels, of which those that were added lately are looked up: neighbours in a file are mostly
+/// neighbours in space, and a flat side of a million facets is a few entries, not a million.
+#[derive(Default)]
+struct Tally {
+    levels: Vec<Level>,
+    /// Where in `levels` one of each family of heights is, plus one; 0 for none.
+    lately: [u32; LATELY],
+}
+
+/// Heights that are looked up.
+const LATELY: usize = 32;
+
+impl Tally {
+    fn add(&mut self, level: Level) {
+        let (facing, z) = level.key();
+        // A multiplicative hash (D. Knuth, TAOCP vol. 3, section 6.4): its upper bits are mixed best.
+        let hash = (z as u64 ^ facing as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let slot = &mut self.lately[(hash >> (64 - LATELY.ilog2())) as usize];
+        let known = slot.checked_sub(1).map(|i| &mut self.levels[i as usize]);
+        match known.filter(|known| known.key() == (facing, z)) {
+            Some(known) => known.area.0 += level.area.0,
+            None => {
+                self.levels.push(level);
+                *slot = self.levels.len() as u32;
+            }
+        }
+    }
 }
 
 /// The facets at one height that look the same way as one, by that and by height.
 fn levels(mut facets: Vec<Level>) -> Vec<Level> {
-    // Most facets lie in few heights: such keys are sorted in almost no time.
-    let key = |facet: &Level| (facet.facing, ordered_bits(facet.z));
-    facets.sort_unstable_by_key(key);
+    facets.sort_unstable_by_key(Level::key);
     let sum = |same: &[Level]| {
         let area = same.iter().map(|facet| facet.area.0).sum();
         Level { area: Area(area), ..same[0] }
     };
-    facets.chunk_by(|a, b| key(a) == key(b)).map(sum).collect()
+    facets.chunk_by(|a, b| a.key() == b.key()).map(sum).collect()
+}
+
+impl Level {
+    /// What levels are sorted by, and equal in when they are one.
+    fn key(&self) -> (Facing, i64) {
+        (self.facing, ordered_bits(self.z))
+    }
 }
 
 /// The bits of a number as an integer of the same order.
@@ -228,6 +279,21 @@ mod tests {
         assert_eq!(flats.len(), 1, "{flats:?}");
         assert!((flats[0].area_mm2 - 200.0).abs() < 0.1);
         assert!((flats[0].z_mm - 1.0).abs() < 0.005);
+    }
+
+    #[test]
+    fn areas_add_up_however_large() {
+        let huge = shapes::block(30_000.0, 20_000.0, 1.0);
+        assert_eq!(found(&huge).iter().map(|f| f.1).collect::<Vec<_>>(), [6e8, 6e8]);
+        // Far more heights than are looked up at once, each in several places of the file.
+        let mut stairs = ramp(300, |i| if i % 2 == 0 { 0.0 } else { 0.5 });
+        let flats = |mesh: &Mesh| flats(mesh, &USUAL);
+        let once = flats(&stairs);
+        assert_eq!(once.len(), 150);
+        stairs.triangles.extend_from_within(..);
+        let twice = flats(&stairs);
+        assert!(once.iter().zip(&twice).all(|(a, b)| 2.0 * a.area_mm2 == b.area_mm2));
+        assert_eq!(once.len(), twice.len());
     }
 
     #[test]

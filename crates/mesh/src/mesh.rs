@@ -79,7 +79,12 @@ impl Mesh {
     /// Returns the outward normal of a triangle times twice its area, mm².
     #[must_use]
     pub fn area_vector(&self, triangle: u32) -> Vector3<f64> {
-        let [a, b, c] = self.corners(triangle);
+        self.area_vector_of(&self.triangles[triangle as usize])
+    }
+
+    /// The same of a triangle that is given by its corners.
+    pub(crate) fn area_vector_of(&self, corners: &[u32; 3]) -> Vector3<f64> {
+        let [a, b, c] = corners.map(|v| self.vertices[v as usize]);
         (b - a).cross(&(c - a))
     }
 

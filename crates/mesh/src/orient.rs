@@ -21,15 +21,16 @@
 //! out farther, are passed over: such a part would stand on a point.
 
 mod classes;
+mod lying;
 mod support;
 
 pub use support::{Rating, rate};
 
 use crate::mesh::Mesh;
 use crate::place::reference_azimuth;
-use classes::Faces;
-use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
-use rayon::prelude::*;
+use classes::{Class, Classes};
+use lying::{Lying, View};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::f64::consts::TAU;
 
 /// What counts as one direction and as an overhang.
@@ -102,9 +103,9 @@ const MOST_CLASSES: usize = 8;
 /// Returns ways to lie, the best first.
 #[must_use]
 pub fn candidates(mesh: &Mesh, params: &OrientParams) -> Vec<Candidate> {
-    let faces = Faces::of(mesh);
-    let classes = classes::classes(&faces, params.class_tolerance_rad);
-    let ranked = ranked(mesh, &faces, &classes[..classes.len().min(MOST_CLASSES)], params);
+    let Classes { classes, total_mm2 } = classes::classes(mesh, params.class_tolerance_rad, 0.0);
+    let view = View::of(mesh, total_mm2, params);
+    let ranked = ranked(&view, &classes[..classes.len().min(MOST_CLASSES)]);
     ranked.into_iter().map(|lying| lying.candidate).collect()
 }
 
@@ -117,16 +118,15 @@ pub fn laid(mesh: &Mesh, candidate: &Candidate) -> Rotation3<f64> {
 /// Returns the rotation `part_from_model` that lays the part on its largest flat side.
 #[must_use]
 pub fn rest(mesh: &Mesh, params: &OrientParams) -> (Rotation3<f64>, Rest) {
-    let faces = Faces::of(mesh);
-    let classes = classes::classes(&faces, params.class_tolerance_rad);
-    let largest_share = classes.first().map_or(0.0, |class| class.area_mm2 / faces.total_mm2);
-    let mut classes = classes.as_slice();
-    while let Some(first) = classes.first().filter(|c| c.area_mm2 >= LEAST_SHARE * faces.total_mm2)
-    {
-        let least = first.area_mm2 - SAME_SHARE * faces.total_mm2;
+    let all = classes::classes(mesh, params.class_tolerance_rad, LEAST_SHARE);
+    let view = View::of(mesh, all.total_mm2, params);
+    let largest_share = all.classes.first().map_or(0.0, |class| class.area_mm2 / all.total_mm2);
+    let mut classes = all.classes.as_slice();
+    while let Some(first) = classes.first().filter(|c| c.area_mm2 >= LEAST_SHARE * all.total_mm2) {
+        let least = first.area_mm2 - SAME_SHARE * all.total_mm2;
         let (tied, smaller) = classes.split_at(classes.partition_point(|c| c.area_mm2 >= least));
-        let stands = |c: &Lying| c.stand_mm2 >= LEAST_STAND_SHARE * faces.total_mm2;
-        if let Some(best) = ranked(mesh, &faces, tied, params).into_iter().find(stands) {
+        let stands = |c: &Lying| c.stand_mm2 >= LEAST_STAND_SHARE * all.total_mm2;
+        if let Some(best) = ranked(&view, tied).into_iter().find(stands) {
             let best = best.candidate;
             return (part_from_model(mesh, &best.down), Rest::Flat(best));
         }
@@ -165,18 +165,11 @@ fn part_from_model(mesh: &Mesh, down: &Vector3<f64>) -> Rotation3<f64> {
 }
 
 /// The candidates of some classes, the best first.
-fn ranked(
-    mesh: &Mesh,
-    faces: &Faces,
-    classes: &[classes::Class],
-    params: &OrientParams,
-) -> Vec<Lying> {
-    let both_ways = classes.par_iter().flat_map(|class| {
-        [class.direction, -class.direction].map(|down| candidate(mesh, faces, class, down, params))
-    });
-    let mut lying: Vec<Lying> = both_ways.collect();
-    let area = SAME_SHARE * faces.total_mm2;
-    let length = SAME_SHARE * faces.diagonal;
+fn ranked(view: &View, classes: &[Class]) -> Vec<Lying> {
+    let mut lying = view.lying(classes);
+    let mesh = view.mesh;
+    let area = SAME_SHARE * view.total_mm2;
+    let length = SAME_SHARE * view.diagonal;
     // Computed when two candidates differ in nothing else.
     let mut reference = None;
     let mut ranked = Vec::with_capacity(lying.len());
@@ -208,82 +201,6 @@ fn keep_least(best: &mut Vec<usize>, tolerance: f64, value: impl Fn(usize) -> f6
 fn azimuth_from(reference: f64, down: &Vector3<f64>) -> f64 {
     let turn = (down.y.atan2(down.x) - reference).rem_euclid(TAU);
     if turn > TAU - SAME_ANGLE_RAD { 0.0 } else { turn }
-}
-
-/// A candidate, and whether it would stand.
-struct Lying {
-    candidate: Candidate,
-    /// Area that faces down within [`STAND_DEPTH_SHARE`] of the bed, mm².
-    stand_mm2: f64,
-}
-
-fn candidate(
-    mesh: &Mesh,
-    faces: &Faces,
-    class: &classes::Class,
-    down: Vector3<f64>,
-    params: &OrientParams,
-) -> Lying {
-    let side = Side::below(mesh, faces, &down, params);
-    let candidate = Candidate {
-        // Adding zero makes -0 into 0, which reads better in a report.
-        down: down.map(|c| c + 0.0),
-        class_area_mm2: class.area_mm2,
-        bed_area_mm2: side.bed_mm2,
-        height_mm: side.height_mm,
-        overhang_area_mm2: side.overhang_mm2,
-    };
-    Lying { candidate, stand_mm2: side.stand_mm2 }
-}
-
-/// What is at the bottom of a part when some direction goes down. Areas mm².
-struct Side {
-    /// Area that faces down and lies on the bed.
-    bed_mm2: f64,
-    /// Area that faces down within [`STAND_DEPTH_SHARE`] of the bed.
-    stand_mm2: f64,
-    /// Area not on the bed that faces down too steeply.
-    overhang_mm2: f64,
-    height_mm: f64,
-}
-
-impl Side {
-    fn below(mesh: &Mesh, faces: &Faces, down: &Vector3<f64>, params: &OrientParams) -> Self {
-        let depth = |p: &Point3<f64>| p.coords.dot(down);
-        let none = || (f64::INFINITY, f64::NEG_INFINITY);
-        let reach = mesh.vertices.par_iter().map(|p| (depth(p), depth(p)));
-        let (top, bed) = reach.reduce(none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let on_bed = bed - BED_SHARE * faces.diagonal;
-        let near_bed = bed - STAND_DEPTH_SHARE * faces.diagonal;
-        let of_class = params.class_tolerance_rad.cos();
-        let steep = params.overhang_rad.sin() + SAME_SHARE;
-        let height_mm = if mesh.vertices.is_empty() { 0.0 } else { bed - top };
-        let none = Self { bed_mm2: 0.0, stand_mm2: 0.0, overhang_mm2: 0.0, height_mm };
-        let piece = |(k, normals): (usize, &[Vector3<f64>])| {
-            let mut side = Self { ..none };
-            for (t, normal) in (k * PIECE..).zip(normals) {
-                let (facing, area) = (normal.dot(down), faces.areas_mm2[t]);
-                let lowest = || mesh.corners(t as u32).iter().map(depth).fold(f64::MAX, f64::min);
-                let lowest = if facing >= of_class { lowest() } else { f64::NEG_INFINITY };
-                if lowest >= near_bed {
-                    side.stand_mm2 += area;
-                }
-                if lowest >= on_bed {
-                    side.bed_mm2 += area;
-                } else if facing > steep {
-                    side.overhang_mm2 += area;
-                }
-            }
-            side
-        };
-        let pieces: Vec<Self> = faces.normals.par_chunks(PIECE).enumerate().map(piece).collect();
-        pieces.iter().fold(none, |sum, piece| Self {
-            bed_mm2: sum.bed_mm2 + piece.bed_mm2,
-            stand_mm2: sum.stand_mm2 + piece.stand_mm2,
-            overhang_mm2: sum.overhang_mm2 + piece.overhang_mm2,
-            height_mm,
-        })
-    }
 }
 
 #[cfg(test)]

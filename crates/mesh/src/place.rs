@@ -76,7 +76,7 @@ pub fn footprint(mesh: &Mesh) -> Option<Circle> {
 
 /// The points seen from above, without those that are surely inside their hull: a hull needs a
 /// sort of its points, and most points of a mesh are inside.
-fn outermost<I: Iterator<Item = Point3<f64>>>(points: impl Fn() -> I) -> Vec<Point2<f64>> {
+fn outermost<I: ExactSizeIterator<Item = Point3<f64>>>(points: impl Fn() -> I) -> Vec<Point2<f64>> {
     let points = || points().map(|p| p.xy());
     // Points far out in each direction and its opposite are in the hull, and so is all between.
     const N_DIRECTIONS: usize = 16;
@@ -86,7 +86,9 @@ fn outermost<I: Iterator<Item = Point3<f64>>>(points: impl Fn() -> I) -> Vec<Poi
         [cos, sin]
     });
     let mut far = [(f64::NEG_INFINITY, Point2::origin()); N_DIRECTIONS];
-    for p in points() {
+    // Any points make such a polygon: of many, some are enough for one that holds nearly as much.
+    let step = 1 + points().len() / MANY;
+    for p in points().step_by(step) {
         for (i, [x, y]) in ways.iter().enumerate() {
             let reach = p.x * x + p.y * y;
             if reach > far[i].0 {
@@ -100,15 +102,18 @@ fn outermost<I: Iterator<Item = Point3<f64>>>(points: impl Fn() -> I) -> Vec<Poi
     let corners = far.map(|(_, p)| p);
     let mean = corners.iter().map(|p| p.coords).sum::<Vector2<f64>>();
     let centre = Point2::from(mean / N_DIRECTIONS as f64);
-    let inside = inscribed(&corners, &centre);
+    let inside = inscribed(&corners, &centre).max(0.0).powi(2);
     let left: Vec<Point2<f64>> =
-        points().filter(|p| nalgebra::distance(p, &centre) >= inside).collect();
+        points().filter(|p| nalgebra::distance_squared(p, &centre) >= inside).collect();
     if left.len() <= FEW { left } else { far_in_sectors(left, &centre) }
 }
 
 /// A point this far from a side, mm, is on that side of it: far above rounding, and a point left in
 /// only takes time.
 const SURELY: f64 = 1e-6;
+
+/// So many points hold nearly all of what all of them hold.
+const MANY: usize = 1 << 16;
 
 /// A hull of so many points takes no time to speak of.
 const FEW: usize = 4096;
