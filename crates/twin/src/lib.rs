@@ -28,7 +28,7 @@ pub mod motor;
 pub mod nearest;
 pub mod picture;
 mod pile;
-mod ramps;
+pub mod ramps;
 pub mod replay;
 pub mod rounding;
 #[cfg(test)]

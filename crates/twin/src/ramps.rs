@@ -12,6 +12,8 @@
 //! Uniformly accelerated motion: `v² = v₀² + 2·a·d`; a line entered at `v₀` and left at `v₁` peaks at
 //! `v² = a·d + (v₀² + v₁²)/2` or at its `F`. mm, radians, seconds.
 
+use std::collections::VecDeque;
+
 use machine::profile::Printer;
 
 use crate::segment::Segment;
@@ -31,6 +33,53 @@ pub(crate) struct Ramps {
     /// The square of the speed at which the first of them is entered.
     entry: f64,
     time: f64,
+    /// How long each move took, where somebody wants to know.
+    each: Option<Vec<f64>>,
+}
+
+/// Tells for each segment how long it really takes, some segments later.
+#[derive(Debug, Clone)]
+pub struct Clock {
+    ramps: Ramps,
+    /// Not yet told.
+    waiting: VecDeque<Segment>,
+}
+
+impl Clock {
+    /// Returns the clock of a printer that stands still.
+    #[must_use]
+    pub fn new(printer: &Printer) -> Self {
+        let ramps = Ramps { each: Some(Vec::new()), ..Ramps::new(printer) };
+        Self { ramps, waiting: VecDeque::new() }
+    }
+
+    /// The next segment; `each` is given those that are timed by now, in order, with the duration
+    /// that ramps give them.
+    pub fn segment(&mut self, segment: &Segment, each: impl FnMut(&Segment)) {
+        self.waiting.push_back(*segment);
+        self.ramps.segment(segment);
+        self.tell(each);
+    }
+
+    /// The program ends: `each` is given the rest.
+    pub fn finish(mut self, each: impl FnMut(&Segment)) {
+        self.ramps.rest();
+        self.tell(each);
+    }
+
+    fn tell(&mut self, mut each: impl FnMut(&Segment)) {
+        let times = self.ramps.each.as_mut().map(std::mem::take).unwrap_or_default();
+        let mut times = times.into_iter();
+        while let Some(next) = self.waiting.front() {
+            let runs = next.path > 0.0 && next.duration > 0.0;
+            let duration = if runs { times.next() } else { Some(next.duration) };
+            let (Some(duration), Some(segment)) = (duration, self.waiting.front().copied()) else {
+                break;
+            };
+            self.waiting.pop_front();
+            each(&Segment { duration, ..segment });
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -64,6 +113,7 @@ impl Ramps {
             ahead: Vec::new(),
             entry: 0.0,
             time: 0.0,
+            each: None,
         }
     }
 
@@ -132,7 +182,11 @@ impl Ramps {
         entries[0] = self.entry;
         for (k, run) in self.ahead[..count].iter().enumerate() {
             entries[k + 1] = f64::min(entries[k + 1], run.reached_from(entries[k]));
-            self.time += run.time(entries[k], entries[k + 1]);
+            let time = run.time(entries[k], entries[k + 1]);
+            self.time += time;
+            if let Some(each) = &mut self.each {
+                each.push(time);
+            }
         }
         self.entry = entries[count];
         self.ahead.drain(..count);
@@ -198,6 +252,30 @@ mod tests {
         let mut lines = along(&[10.0, 40.0, 70.0], 60.0);
         lines.insert(1, filament_segment(-0.8, 8.0));
         assert!((time(&printer, &lines) - (2.0 * one + 0.1)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn every_move_is_told_its_time_in_order() {
+        let printer = printer();
+        let pieces: Vec<f64> = (0..=9000).map(|k| 10.0 + f64::from(k) * 0.01).collect();
+        let mut lines = along(&pieces, 60.0);
+        lines.insert(4000, filament_segment(-0.8, 8.0));
+        for (k, line) in lines.iter_mut().enumerate() {
+            line.line = k;
+        }
+        let mut told = Vec::new();
+        let mut clock = Clock::new(&printer);
+        for line in &lines {
+            clock.segment(line, |segment| told.push(*segment));
+        }
+        assert!(told.len() > 4000 && told.len() < lines.len(), "memory stays bounded");
+        clock.finish(|segment| told.push(*segment));
+        assert!(told.iter().map(|segment| segment.line).eq(0..lines.len()));
+        let sum: f64 = told.iter().map(|segment| segment.duration).sum();
+        assert!((sum - time(&printer, &lines)).abs() < 1e-9);
+        // The first takes longer than it would at its F, those amid a line do not.
+        assert!(told[0].duration > 2.0 * lines[0].duration);
+        assert!((told[2000].duration - lines[2000].duration).abs() < 1e-12);
     }
 
     #[test]

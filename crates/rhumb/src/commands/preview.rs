@@ -8,6 +8,7 @@ use twin::picture::layer::{LayerSink, layer_svg};
 use twin::picture::plot::{Flat, MotionSink, motion_svg, schedule_svg};
 use twin::picture::print::{PrintSink, Shade, print_svg};
 use twin::picture::relief::{height_png, section_png};
+use twin::ramps::Clock;
 use twin::segment::Segment;
 use twin::verify::Verdict;
 
@@ -143,7 +144,11 @@ impl<'a> Program<'a> {
         let job = &self.job;
         let mut columns = Columns::new(&job.printer);
         // Places are told as the program says them.
-        let reading = self.replay_about(Vector2::zeros(), |segment| columns.add(segment))?;
+        let mut clock = Clock::new(&job.printer);
+        let reading = self.replay_about(Vector2::zeros(), |segment| {
+            clock.segment(segment, |timed| columns.add(timed));
+        })?;
+        clock.finish(|timed| columns.add(timed));
         let axis = job.printer.alignment.part_from_bed(&Vector2::zeros());
         let is_judged = !self.is_foreign || !reading.findings.is_empty();
         let about = About {
@@ -199,7 +204,9 @@ impl<'a> Program<'a> {
         match self.arguments.plot {
             Some(Plot::Motion) => {
                 let mut sink = MotionSink::new(printer, self.job.plan.filament.area);
-                self.replay(|segment| sink.add(segment))?;
+                let mut clock = Clock::new(printer);
+                self.replay(|segment| clock.segment(segment, |timed| sink.add(timed)))?;
+                clock.finish(|timed| sink.add(timed));
                 Ok(motion_svg(&sink))
             }
             Some(Plot::Schedule) => self.schedule(),
