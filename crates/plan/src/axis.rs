@@ -52,18 +52,26 @@ pub fn distance_to_axis(a: &Point2<f64>, b: &Point2<f64>) -> f64 {
     geom::polyline::distance_to_segment(a, b, &Point2::origin())
 }
 
-/// Returns the way from `a` to `b`, which both must lie outside of the clearance or on its rim.
+/// Returns the way along the line from `a` to `b`, begun at `from`: where the line lies within the
+/// clearance, along its rim instead, from where it enters to where it leaves. An end that lies within is
+/// taken to the rim in its own direction, and `from`, where the nozzle stands, is `a` or the place on the
+/// rim to which `a` was taken. So what is left of the line is kept as it is.
 #[must_use]
-pub fn keep_clear(a: &Point2<f64>, b: &Point2<f64>, clearance: f64) -> Vec<Piece> {
+pub fn keep_clear(from: &Point2<f64>, [a, b]: [&Point2<f64>; 2], clearance: f64) -> Vec<Piece> {
     if distance_to_axis(a, b) >= clearance * (1.0 - SLACK) {
         return vec![Piece::Line(*b)];
     }
-    let unit = (b - a).normalize();
+    let unit = (b - a).try_normalize(0.0).unwrap_or_else(nalgebra::zero);
     let along = -a.coords.dot(&unit);
     let foot = a + unit * along;
     let half_chord = (clearance * clearance - foot.coords.norm_squared()).max(0.0).sqrt();
-    let entry = on_rim(foot - unit * half_chord, clearance);
-    let exit = on_rim(foot + unit * half_chord, clearance);
+    let is_outside = |p: &Point2<f64>| p.coords.norm() >= clearance * (1.0 - SLACK);
+    let entry = if is_outside(a) { on_rim(foot - unit * half_chord, clearance) } else { *from };
+    let exit = if is_outside(b) {
+        on_rim(foot + unit * half_chord, clearance)
+    } else {
+        outside(*b, entry, clearance)
+    };
     // Round the side on which the line passes; exactly through the middle, counter-clockwise.
     let sweep = entry.coords.perp(&exit.coords).atan2(entry.coords.dot(&exit.coords));
     let passes_left = unit.perp(&(Point2::origin() - foot)) > 0.0;
@@ -73,12 +81,18 @@ pub fn keep_clear(a: &Point2<f64>, b: &Point2<f64>, clearance: f64) -> Vec<Piece
         sweep
     };
     let mut pieces = Vec::with_capacity(3);
-    if distance(a, &entry) > clearance * SLACK {
+    let is_apart = |p: &Point2<f64>, q: &Point2<f64>| distance(p, q) > clearance * SLACK;
+    if is_apart(from, &entry) {
         pieces.push(Piece::Line(entry));
     }
-    pieces.push(Piece::Arc(sweep, exit));
-    if distance(&exit, b) > clearance * SLACK {
+    if is_apart(&entry, &exit) {
+        pieces.push(Piece::Arc(sweep, exit));
+    }
+    if is_outside(b) && is_apart(&exit, b) {
         pieces.push(Piece::Line(*b));
+    } else if pieces.is_empty() {
+        // Nowhere to go; but the height may change.
+        pieces.push(Piece::Line(exit));
     }
     pieces
 }
@@ -110,8 +124,9 @@ mod tests {
     #[test]
     fn far_lines_are_left_alone() {
         let (a, b) = (Point2::new(-5.0, 1.0), Point2::new(5.0, 1.0));
-        assert_eq!(keep_clear(&a, &b, 0.5), [Piece::Line(b)]);
-        assert_eq!(keep_clear(&a, &Point2::new(-2.0, 0.1), 0.5).len(), 1, "it ends before");
+        assert_eq!(keep_clear(&a, [&a, &b], 0.5), [Piece::Line(b)]);
+        let before = Point2::new(-2.0, 0.1);
+        assert_eq!(keep_clear(&a, [&a, &before], 0.5).len(), 1, "it ends before");
     }
 
     #[test]
@@ -122,7 +137,7 @@ mod tests {
             let unit = Vector2::new(angle.cos(), angle.sin());
             let side = Vector2::new(-unit.y, unit.x) * offset;
             let (a, b) = (Point2::from(side - unit * 4.0), Point2::from(side + unit * 7.0));
-            let way = keep_clear(&a, &b, 0.4);
+            let way = keep_clear(&a, [&a, &b], 0.4);
             for p in points(&way, a) {
                 assert!(p.coords.norm() >= 0.4 * (1.0 - 1e-6), "offset {offset}: {p}");
             }
@@ -132,6 +147,27 @@ mod tests {
                 assert!(sweep.abs() <= PI + 1e-9 && (offset == 0.0 || sweep * offset < 0.0));
             }
         }
+    }
+
+    #[test]
+    fn a_line_that_begins_or_ends_within_is_kept_outside() {
+        // The side of a bar past the axis, with its corner within the clearance.
+        let (corner, end) = (Point2::new(0.375, 0.375), Point2::new(0.375, 30.0));
+        let from = outside(corner, end, 0.8);
+        let way = keep_clear(&from, [&corner, &end], 0.8);
+        let leaves = Point2::new(0.375, (0.64_f64 - 0.375 * 0.375).sqrt());
+        assert!(
+            matches!(way[0], Piece::Arc(sweep, to) if sweep > 0.0 && (to - leaves).norm() < 1e-12)
+        );
+        assert_eq!(way[1..], [Piece::Line(end)]);
+        let back = keep_clear(&end, [&end, &corner], 0.8);
+        assert!((back[0].end() - leaves).norm() < 1e-12);
+        assert!((back[1].end() - from).norm() < 1e-12 && back.len() == 2);
+        // Wholly within: along the rim, and nowhere at all straight towards the axis.
+        let inner = Point2::new(0.3, 0.3);
+        let nowhere = keep_clear(&from, [&corner, &inner], 0.8);
+        assert!(nowhere.len() == 1 && (nowhere[0].end() - from).norm() < 1e-12);
+        assert_eq!(keep_clear(&from, [&corner, &Point2::new(-0.1, 0.1)], 0.8).len(), 1);
     }
 
     #[test]

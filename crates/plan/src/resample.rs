@@ -87,6 +87,10 @@ const HEIGHT_TOLERANCE_MM: f64 = 0.005;
 /// rail and of angle, at the rim of the largest beds.
 const ROUNDING_MM: f64 = 1e-3;
 
+/// How far rounding may bring two words from their place near the axis, mm: half a last place each, and
+/// both ends of a move.
+const NEAR_AXIS_ROUNDING_MM: f64 = 2e-5;
+
 /// What is shorter is the last digits of one place, mm: a tenth of the finest last place.
 const LEAST_PATH_MM: f64 = 1e-6;
 
@@ -125,6 +129,8 @@ pub struct Resampler {
     branch: Branch,
     /// Where the nozzle stands over the bed; not always where the last stroke ended.
     over_bed: Point2<f64>,
+    /// Where the last stroke ended, though that may be too near to the axis.
+    meant: Point2<f64>,
     /// Where it stands in the part, as the text says it.
     at_part: Point3<f64>,
     /// Filament of strokes too short to be moves, for the next one that lays material, mm.
@@ -159,6 +165,7 @@ impl Resampler {
             joints: printer.home,
             branch: Branch::Near,
             over_bed: Point2::from(printer.alignment.over_bed(&at.xy())),
+            meant: Point2::from(printer.alignment.over_bed(&at.xy())),
             at_part: at,
             owed: 0.0,
             owed_back: 0.0,
@@ -171,7 +178,7 @@ impl Resampler {
         let joints = printer.home;
         let at_part = self.alignment.part_from_joints(&joints);
         let over_bed = Point2::from(self.alignment.over_bed(&at_part.xy()));
-        Self { joints, branch: Branch::Near, over_bed, at_part, ..self.clone() }
+        Self { joints, branch: Branch::Near, over_bed, meant: over_bed, at_part, ..self.clone() }
     }
 
     /// Filament of strokes too short to be moves that is still to be laid, mm.
@@ -355,6 +362,7 @@ impl Resampler {
         } else {
             self.clear_of_axis(stroke.kind, &target, legs)?;
         }
+        self.meant = target.over_bed;
         // The stroke's filament is spread over its legs by length.
         let length: f64 = legs[first..].iter().map(|leg| leg.path).sum();
         let filament = self.with_owed(stroke.kind, stroke.filament, legs.len() > first);
@@ -387,15 +395,16 @@ impl Resampler {
             if kind == Kind::Print { self.params.chord } else { self.params.travel_chord };
         let clearance = self.clear_radius(self.joints.z).max(self.clear_radius(target.z));
         // Most lines are nowhere near.
-        if distance_to_axis(&self.over_bed, &target.over_bed) >= clearance {
+        if distance_to_axis(&self.over_bed, &target.over_bed) >= clearance
+            && self.meant == self.over_bed
+        {
             return self.line(kind, target, tolerance, legs);
         }
         let from = Target {
             over_bed: outside(self.over_bed, target.over_bed, clearance),
             z: self.joints.z,
         };
-        let goal = outside(target.over_bed, from.over_bed, clearance);
-        let way = keep_clear(&from.over_bed, &goal, clearance);
+        let way = keep_clear(&from.over_bed, [&self.meant, &target.over_bed], clearance);
         let lengths = way_lengths(&way, from.over_bed, clearance);
         let whole: f64 = lengths.iter().sum();
         for (k, piece) in way.iter().enumerate() {
@@ -418,11 +427,11 @@ impl Resampler {
     /// How far from the axis places of the bed must be at a height, so that the nozzle and the carriage
     /// both keep the printer's clearance.
     fn clear_radius(&self, z: f64) -> f64 {
-        let chords_keep_clear = match self.params.dialect.space {
-            Space::IdealPlane => (ARC_CHORD / 2.0).cos(),
-            Space::Joints | Space::Part => 1.0,
-        };
-        self.alignment.clear_radius_at(self.clearance, z) / chords_keep_clear
+        let clear = self.alignment.clear_radius_at(self.clearance, z);
+        match self.params.dialect.space {
+            Space::IdealPlane => (clear + NEAR_AXIS_ROUNDING_MM) / (ARC_CHORD / 2.0).cos(),
+            Space::Joints | Space::Part => clear,
+        }
     }
 
     /// Whether the move to `to` leaves its line by far more than the tolerance. Its deviation in the

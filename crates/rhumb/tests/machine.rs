@@ -10,7 +10,7 @@ use plan::planner::Totals;
 use rhumb::check::check;
 use rhumb::interrupt::Interrupt;
 use rhumb::pipeline::{Request, Watch, part, slice};
-use rhumb::place::Wish;
+use rhumb::place::{Pose, Wish};
 use rhumb::progress::Silent;
 use rhumb::settings::{Job, Settings, Sources};
 use twin::finding::Severity;
@@ -143,13 +143,80 @@ fn a_calibrated_boss_has_its_radius() {
     assert!((low - radius).abs() < slack && (high - radius).abs() < slack, "{low} {high}");
 }
 
+fn round(diameter: f64) -> Mesh {
+    let ring: Vec<[f64; 2]> = (0..72)
+        .map(|k| f64::from(k * 5).to_radians())
+        .map(|angle| [angle.cos(), angle.sin()])
+        .map(|[x, y]| [diameter / 2.0 * x, diameter / 2.0 * y])
+        .collect();
+    shapes::extruded(&ring, &[], 0.6)
+}
+
+fn bar(length: f64, width: f64) -> Mesh {
+    let ring = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+        .map(|[x, y]| [length / 2.0 * x, width / 2.0 * y]);
+    shapes::extruded(&ring, &[], 0.6)
+}
+
+fn arms(length: f64, width: f64) -> Mesh {
+    let (far, near) = (length / 2.0, width / 2.0);
+    let ring = [
+        [near, near],
+        [near, far],
+        [-near, far],
+        [-near, near],
+        [-far, near],
+        [-far, -near],
+        [-near, -near],
+        [-near, -far],
+        [near, -far],
+        [near, -near],
+        [far, -near],
+        [far, near],
+    ];
+    shapes::extruded(&ring, &[], 0.6)
+}
+
+/// Slices a mesh where it stands, and expects a judge who has nothing to say.
+fn flawless(mesh: &Mesh, centre: [f64; 2], settings: &Settings, job: &Job) {
+    let model = mesh::stl::write(mesh);
+    let wish = Wish { pose: Pose::Keep, centre: centre.into(), ..Wish::default() };
+    let request = Request { model: &model, name: "test", wish, settings, job, made_at: "now" };
+    let mut text = Vec::new();
+    let watch = &mut Watch { progress: &mut Silent, interrupt: &Interrupt::default() };
+    let outcome = slice(&request, &mut text, watch).expect("it can be sliced");
+    let must_go_round = job.printer.rail.min >= 0.0;
+    let mut nearest = f64::INFINITY;
+    let each = |segment: &Segment| {
+        if let Some(ends) = segment.joints.filter(|_| segment.path > 0.0) {
+            // What the firmware is told, straight from end to end.
+            let [a, b] = ends.map(|to| {
+                let (sin, cos) = to.turn.radians().sin_cos();
+                Point2::new(to.s * cos, to.s * sin)
+            });
+            let distance = geom::polyline::distance_to_segment(&a, &b, &Point2::origin());
+            nearest = f64::min(nearest, distance);
+        }
+    };
+    let verdict = check(text.as_slice(), job, Some(part(&outcome)), false, each).expect("memory");
+    assert!(verdict.findings.is_empty(), "{}: {:?}", job.dialect.name, verdict.findings);
+    if must_go_round {
+        let clearance = job.printer.axis_clearance;
+        assert!(nearest >= clearance, "{}: {nearest} mm from the axis", job.dialect.name);
+    }
+}
+
 #[test]
 fn what_lies_over_the_axis_is_printed_in_every_dialect() {
-    let disc: Vec<[f64; 2]> = (0..120)
-        .map(|k| (f64::from(k) * 3.0).to_radians())
-        .map(|angle| [8.0 * angle.cos(), 8.0 * angle.sin()])
-        .collect();
-    let models = [shapes::extruded(&disc, &[], 0.8), shapes::cross(2.0)];
+    let models = [
+        (round(8.0), [0.0; 2]),
+        (round(8.0), [0.1, 0.0]),
+        (round(1.0), [0.0; 2]),
+        (arms(20.0, 4.0), [0.0; 2]),
+        (arms(30.0, 1.2), [0.0; 2]),
+        (bar(24.0, 0.6), [0.0; 2]),
+        (bar(24.0, 0.45), [0.05, 0.1]),
+    ];
     let printers = [
         "generic-polar",
         "klipper-polar",
@@ -171,13 +238,16 @@ fn what_lies_over_the_axis_is_printed_in_every_dialect() {
     missed.bed.zero = 0.05;
     missed.bed.backlash = 0.05_f64.to_radians();
     for printer in printers {
-        let (settings, mut job) = job(printer, &["fill_density=1"]);
+        let (settings, mut job) = job(printer, &["skirts=0"]);
         for alignment in [Alignment::IDEAL, missed] {
             job.printer.alignment = alignment;
-            for model in &models {
-                program(model, &settings, &job);
+            for (model, centre) in &models {
+                flawless(model, *centre, &settings, &job);
             }
         }
+        let (settings, job) = self::job(printer, &["fill_density=1"]);
+        flawless(&round(8.0), [0.0; 2], &settings, &job);
+        flawless(&arms(20.0, 4.0), [0.0; 2], &settings, &job);
     }
 }
 
@@ -246,8 +316,11 @@ fn no_firmware_gets_more_moves_in_a_second_than_it_takes() {
         let (mut ends, mut shortest) = (vec![0.0], f64::INFINITY);
         check(text.as_slice(), &job, None, false, |segment| {
             if segment.duration > 0.0 {
-                shortest = segment.duration.min(shortest);
-                ends.push(ends.last().expect("one at least") + segment.duration);
+                // Marlin stretches what it runs at its own pace itself, should its queue run dry.
+                let least = if segment.is_paced { 1.0 / limit } else { 0.0 };
+                let duration = segment.duration.max(least);
+                shortest = duration.min(shortest);
+                ends.push(ends.last().expect("one at least") + duration);
             }
         })
         .expect("memory");

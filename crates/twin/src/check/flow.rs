@@ -69,8 +69,8 @@ pub(crate) struct Flow {
     filament_area: f64,
     /// mm³/s.
     volume_per_second: f64,
-    /// Nearer to the axis nothing is judged, mm.
-    round_axis: f64,
+    /// What nozzle and carriage keep from the axis, mm.
+    clearance: f64,
     mark: Option<LayerMark>,
     /// The curved family that this planar layer lies on.
     ground: Option<Family>,
@@ -82,12 +82,11 @@ impl Flow {
     /// Returns the check for this printer and filament of this cross-section, mm², of which so much
     /// melts, mm³/s.
     pub(crate) fn new(printer: &Printer, filament_area: f64, volume_per_second: f64) -> Self {
-        let round_axis = ROUND_AXIS * printer.axis_clearance;
         Self {
             alignment: printer.alignment,
             filament_area,
             volume_per_second,
-            round_axis,
+            clearance: printer.axis_clearance,
             mark: None,
             ground: None,
             classes: Default::default(),
@@ -109,7 +108,8 @@ impl Flow {
         if !segment.extrudes() || segment.role == Role::Custom || segment.width <= 0.0 {
             return;
         }
-        if segment.nearest < self.round_axis {
+        let clear = self.alignment.clear_radius_at(self.clearance, segment.part[1].z);
+        if segment.nearest < ROUND_AXIS * clear {
             return;
         }
         let announced = area(segment.width, height);
