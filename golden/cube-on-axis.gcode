@@ -689,6 +689,8 @@ M84
 ; fill_density = 15%
 ; fill_pattern = rectilinear
 ; solid_fill_pattern = rectilinear
+; top_fill_pattern = monotonic
+; infill_anchor_max = 10
 ; fill_angle = 45
 ; solid_infill_below_area = 20
 ; skirts = 0

@@ -1,6 +1,6 @@
 //! Settings: a mistake is found before any work is done, and the message says what to write.
 
-use crate::run::Scratch;
+use crate::run::{Scratch, root};
 
 #[test]
 fn an_unknown_key_names_the_nearest_valid_one() {
@@ -78,4 +78,18 @@ fn every_built_in_profile_resolves() {
     for (_, name) in profiles {
         scratch.run(&["profile", "show", name.trim()]).expect(0);
     }
+}
+
+#[test]
+fn the_settings_page_lists_what_there_is() {
+    let path = root().join("docs/settings.md");
+    let now = rhumb::settings::page::markdown();
+    if std::env::var_os("UPDATE_GOLDEN").is_some_and(|value| value == "1") {
+        std::fs::write(&path, &now).unwrap();
+    }
+    let written = std::fs::read_to_string(&path).unwrap();
+    for (written, now) in written.lines().zip(now.lines()) {
+        assert_eq!(written, now, "docs/settings.md is older than the settings");
+    }
+    assert_eq!(written.lines().count(), now.lines().count());
 }

@@ -83,7 +83,17 @@ fn settings(random: &mut Random) -> Vec<String> {
         let value = number(random, low, high);
         may(random, name, value);
     }
-    let patterns = ["rectilinear", "grid", "concentric", "archimedeanchords"];
+    let patterns = [
+        "rectilinear",
+        "grid",
+        "triangles",
+        "stars",
+        "cubic",
+        "gyroid",
+        "honeycomb",
+        "concentric",
+        "archimedeanchords",
+    ];
     let value = random.one(&patterns).to_owned();
     may(random, "fill_pattern", value);
     let value = random.one(&["rectilinear", "concentric"]).to_owned();

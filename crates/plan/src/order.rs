@@ -71,7 +71,7 @@ pub fn order(
 fn distance_to_island(island: &IslandPaths, from: &Point2<f64>) -> f64 {
     let external = island.walls.iter().filter_map(|group| group.loops.first());
     external
-        .chain(&island.fills)
+        .chain(island.all_fills())
         .flat_map(|path| &path.stations)
         .map(|station| distance(&station.at.xy(), from))
         .fold(f64::INFINITY, f64::min)
@@ -102,13 +102,26 @@ impl Ordering<'_> {
         for (fill, reversed) in tour(&fills, self.nozzle) {
             self.fill(fill, reversed);
         }
+        let mut runs: Vec<&Vec<Toolpath>> = island.in_order.iter().collect();
+        while !runs.is_empty() {
+            let begins = runs.iter().map(|run| run[0].stations[0].at.xy()).enumerate();
+            let k = begins
+                .min_by(|a, b| {
+                    let from = |at| distance(at, &self.nozzle);
+                    from(&a.1).total_cmp(&from(&b.1)).then(a.0.cmp(&b.0))
+                })
+                .map_or(0, |(k, _)| k);
+            for path in runs.remove(k) {
+                self.fill(path, false);
+            }
+        }
     }
 
     /// Lines by height, in bands, each band by nearest neighbour.
     fn island_uphill(&mut self, island: &IslandPaths) {
         let walls = island.walls.iter().flat_map(|group| &group.loops);
         let mut lines: Vec<(f64, &Toolpath)> =
-            walls.chain(&island.fills).map(|path| (mean_height(path), path)).collect();
+            walls.chain(island.all_fills()).map(|path| (mean_height(path), path)).collect();
         lines.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut rest = &lines[..];
         while let Some(&(lowest, _)) = rest.first() {

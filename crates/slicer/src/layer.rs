@@ -151,7 +151,14 @@ fn fill_island(
     let solid_bead = Bead { width: params.infill.solid_width, thickness };
     let split = split_thin(&walls.interior, &chart, solid_bead.spacing() / 2.0);
     let index = frame.lift.level.index;
-    let layer = FillLayer { index, chart, thickness, tolerance: params.tolerance };
+    let layer = FillLayer {
+        index,
+        chart,
+        surface: frame.lift.surface,
+        level: frame.lift.level.upper,
+        thickness,
+        tolerance: params.tolerance,
+    };
     let interior = split.thick.thinned(SKIN_TOLERANCE_MM);
     let skins = skins(&interior, &chart, neighbours, solid_bead.spacing(), &params.skins);
     let filling = fill(&skins, &layer, &params.infill);
@@ -171,7 +178,16 @@ fn fill_island(
         });
         WallGroup { loops: loops.collect() }
     });
-    (IslandPaths { walls: groups.collect(), outline: frame.seen_from_above(outline), fills }, lost)
+    let in_order = filling.in_order.iter().filter(|lines| !lines.is_empty());
+    let paths = IslandPaths {
+        walls: groups.collect(),
+        outline: frame.seen_from_above(outline),
+        fills,
+        in_order: in_order
+            .map(|lines| lines.iter().map(|line| frame.fill(line)).collect())
+            .collect(),
+    };
+    (paths, lost)
 }
 
 fn single_beads(

@@ -80,8 +80,17 @@ pub struct IslandPaths {
     pub outline: Region,
     /// Walls by outline: that of the island, then its holes.
     pub walls: Vec<WallGroup>,
-    /// Infill and gap fill.
+    /// Infill and gap fill, in any order and direction.
     pub fills: Vec<Toolpath>,
+    /// Open lines that are laid one after the other as they are, after all else of the island.
+    pub in_order: Vec<Vec<Toolpath>>,
+}
+
+impl IslandPaths {
+    /// Returns all lines that are no walls.
+    pub fn all_fills(&self) -> impl Iterator<Item = &Toolpath> {
+        self.fills.iter().chain(self.in_order.iter().flatten())
+    }
 }
 
 /// Everything to be laid in one layer.
@@ -106,7 +115,9 @@ impl LayerPaths {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         let is_empty = |island: &IslandPaths| {
-            island.fills.is_empty() && island.walls.iter().all(|group| group.loops.is_empty())
+            island.fills.is_empty()
+                && island.in_order.is_empty()
+                && island.walls.iter().all(|group| group.loops.is_empty())
         };
         self.adhesion.is_empty() && self.islands.iter().all(is_empty)
     }

@@ -254,7 +254,7 @@ mod tests {
             ("layer_height_mm = -inf", "ConfigRange"),
             ("layer_height_mm = 1e-9", "ConfigRange"),
             ("perimeters = 1000000", "ConfigRange"),
-            ("fill_pattern = \"gyroid\"", "ConfigRange"),
+            ("fill_pattern = \"spaghetti\"", "ConfigRange"),
             ("fill_density = \"150%\"", "ConfigRange"),
         ] {
             assert_eq!(class(text), expected, "{text}");

@@ -255,7 +255,24 @@ const DIALECTS: &[&str] = &[
     "cartesian",
 ];
 
-const PATTERNS: &[&str] = &["rectilinear", "grid", "concentric", "archimedeanchords"];
+const PATTERNS: &[&str] = &[
+    "rectilinear",
+    "alignedrectilinear",
+    "grid",
+    "triangles",
+    "stars",
+    "cubic",
+    "gyroid",
+    "honeycomb",
+    "concentric",
+    "archimedeanchords",
+];
+
+const SOLID_PATTERNS: &[&str] =
+    &["rectilinear", "monotonic", "monotoniclines", "grid", "concentric", "archimedeanchords"];
+
+const TOP_PATTERNS: &[&str] =
+    &["monotonic", "monotoniclines", "rectilinear", "grid", "concentric", "archimedeanchords"];
 
 /// All settings, by section, in the order in which they are shown.
 pub const KEYS: &[Key] = &[
@@ -851,8 +868,34 @@ pub const KEYS: &[Key] = &[
         "solid layers over a surface that is seen from below",
     ),
     share(Print, "fill_density", 0.15, "share of the inside that is filled"),
-    choice(Print, "fill_pattern", PATTERNS, "lines of sparse areas"),
-    choice(Print, "solid_fill_pattern", PATTERNS, "lines of solid areas"),
+    choice(
+        Print,
+        "fill_pattern",
+        PATTERNS,
+        "lines of sparse areas; all but the last two are fixed in space, so that layers of any shape \
+         stand on each other",
+    ),
+    choice(
+        Print,
+        "solid_fill_pattern",
+        SOLID_PATTERNS,
+        "lines of solid areas; on curved layers concentric loops or the spiral",
+    ),
+    choice(
+        Print,
+        "top_fill_pattern",
+        TOP_PATTERNS,
+        "lines of solid areas that are seen from above; monotonic ones are laid from one side to the \
+         other, joined at their ends or (monotoniclines) each on its own",
+    ),
+    number(
+        Print,
+        "infill_anchor_max_mm",
+        "infill_anchor_max",
+        (10.0, 0.0, 1000.0),
+        "longest piece along a wall that joins two sparse lines: up to that it costs less than the \
+         travel that it saves",
+    ),
     number(
         Print,
         "fill_angle_deg",

@@ -3,12 +3,14 @@
 //! Three files, each may inherit from another; the command line wins over all. [`key`] lists every
 //! setting with its unit, range, default and meaning, [`mod@file`] reads TOML, [`merge`] puts the
 //! sources together and remembers which one each value came from, [`resolve`] turns the result into
-//! the parameters of each stage, and [`template`] fills the start and end programs.
+//! the parameters of each stage, [`template`] fills the start and end programs, and [`page`] is the
+//! documentation of them all.
 
 mod expression;
 pub mod file;
 pub mod key;
 pub mod merge;
+pub mod page;
 pub mod resolve;
 pub mod template;
 

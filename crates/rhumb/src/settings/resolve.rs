@@ -18,7 +18,7 @@ use plan::route::{FilamentParams, Speeds};
 use plan::seam::SeamPosition;
 use slicer::adhesion::AdhesionParams;
 use slicer::clearance::NozzleProfile;
-use slicer::infill::{InfillParams, Pattern};
+use slicer::infill::{InfillParams, Pattern, SolidPattern};
 use slicer::layer::PathParams;
 use slicer::level::adaptive::AdaptiveParams;
 use slicer::level::{ScheduleParams, Snap};
@@ -393,11 +393,13 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
         infill: InfillParams {
             density,
             pattern: pattern(get.text("fill_pattern")),
-            solid_pattern: pattern(get.text("solid_fill_pattern")),
+            solid_pattern: solid_pattern(get.text("solid_fill_pattern")),
+            top_pattern: solid_pattern(get.text("top_fill_pattern")),
             angle: get.number("fill_angle_deg").to_radians(),
             width: get.number("infill_extrusion_width_mm"),
             solid_width: get.number("solid_infill_extrusion_width_mm"),
             top_width: get.number("top_infill_extrusion_width_mm"),
+            longest_join: get.number("infill_anchor_max_mm"),
         },
         adhesion: AdhesionParams {
             skirts: get.count("skirts"),
@@ -412,10 +414,26 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
 
 fn pattern(word: &str) -> Pattern {
     match word {
+        "alignedrectilinear" => Pattern::AlignedRectilinear,
         "grid" => Pattern::Grid,
+        "triangles" => Pattern::Triangles,
+        "stars" => Pattern::Stars,
+        "cubic" => Pattern::Cubic,
+        "gyroid" => Pattern::Gyroid,
+        "honeycomb" => Pattern::Honeycomb,
         "concentric" => Pattern::Concentric,
         "archimedeanchords" => Pattern::Archimedean,
         _ => Pattern::Rectilinear,
+    }
+}
+
+fn solid_pattern(word: &str) -> SolidPattern {
+    match word {
+        "monotonic" => SolidPattern::Monotonic { joined: true },
+        "monotoniclines" => SolidPattern::Monotonic { joined: false },
+        "concentric" => SolidPattern::Concentric,
+        "archimedeanchords" => SolidPattern::Archimedean,
+        _ => SolidPattern::Rectilinear,
     }
 }
 

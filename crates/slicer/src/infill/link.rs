@@ -16,7 +16,7 @@ use nalgebra::{Point2, distance};
 use super::{Chord, RimPoint};
 
 /// One end of a chord: the chord's index and 0 for its begin, 1 for its end.
-type End = (usize, usize);
+pub(super) type End = (usize, usize);
 
 /// A piece of rim between two ends, in the direction of the ring.
 #[derive(Clone, Copy)]
@@ -75,12 +75,7 @@ pub(super) fn joined(
         core.rings().map(|ring| ring.iter().map(|&p| mm(p)).collect()).collect();
     let mut joins = possible_joins(&rings, chords);
     joins.retain(|join| join.length <= params.longest);
-    let mut at_end: Vec<[Vec<usize>; 2]> = vec![[Vec::new(), Vec::new()]; chords.len()];
-    for (index, join) in joins.iter().enumerate() {
-        for end in [join.from, join.to] {
-            at_end[end.0][end.1].push(index);
-        }
-    }
+    let at_end = by_end(&joins, chords.len());
     let mut made =
         Made { by_end: vec![[None; 2]; chords.len()], groups: Groups::new(chords.len()) };
     let mut used = vec![false; chords.len()];
@@ -109,6 +104,86 @@ pub(super) fn joined(
         made.make(join);
     }
     chains(&rings, chords, &made.by_end, stub)
+}
+
+/// Joins chosen one by one, for lines whose order is given.
+pub(super) struct Walk<'a> {
+    rings: Vec<Vec<Point2<f64>>>,
+    chords: &'a [Chord],
+    joins: Vec<Join>,
+    at_end: Vec<[Vec<usize>; 2]>,
+    params: JoinParams,
+}
+
+impl<'a> Walk<'a> {
+    pub(super) fn new(core: &Region, chords: &'a [Chord], params: &JoinParams) -> Self {
+        let rings: Vec<Vec<Point2<f64>>> =
+            core.rings().map(|ring| ring.iter().map(|&p| mm(p)).collect()).collect();
+        let joins = possible_joins(&rings, chords);
+        let at_end = by_end(&joins, chords.len());
+        Self { rings, chords, joins, at_end, params: *params }
+    }
+
+    /// The ends that can be reached from an end along the rim, the nearest first.
+    pub(super) fn neighbours(&self, end: End) -> Vec<End> {
+        let mut reached: Vec<(f64, End)> = self.at_end[end.0][end.1]
+            .iter()
+            .map(|&index| (self.joins[index].length, self.joins[index].other(end)))
+            .filter(|(length, other)| *length <= self.params.longest && other.0 != end.0)
+            .collect();
+        reached.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        reached.into_iter().map(|(_, end)| end).collect()
+    }
+
+    /// The line through chords that are each begun at the given end, joined along the rim.
+    pub(super) fn line(&self, entries: &[End]) -> Vec<Point2<f64>> {
+        let Some((&first, &last)) = entries.first().zip(entries.last()) else { return Vec::new() };
+        let mut points = self.share(first);
+        points.reverse();
+        for (k, &(chord, entry)) in entries.iter().enumerate() {
+            if let Some(&(before, entry_before)) = k.checked_sub(1).and_then(|k| entries.get(k)) {
+                self.join((before, 1 - entry_before), (chord, entry), &mut points);
+            }
+            let along = &self.chords[chord].points;
+            if entry == 0 {
+                points.extend(along);
+            } else {
+                points.extend(along.iter().rev());
+            }
+        }
+        points.extend(self.share((last.0, 1 - last.1)));
+        points
+    }
+
+    fn join(&self, from: End, to: End, points: &mut Vec<Point2<f64>>) {
+        let joins = self.at_end[from.0][from.1].iter().map(|&index| &self.joins[index]);
+        let shortest = joins
+            .filter(|join| join.other(from) == to)
+            .min_by(|a, b| a.length.total_cmp(&b.length));
+        if let Some(join) = shortest {
+            append_rim(&self.rings, self.chords, join, join.from == from, points);
+        }
+    }
+
+    /// The rim that belongs to a free end.
+    fn share(&self, end: End) -> Vec<Point2<f64>> {
+        let Some(rim) = self.chords[end.0].ends[end.1].filter(|_| self.params.fill_rim) else {
+            return Vec::new();
+        };
+        let beside = self.at_end[end.0][end.1].iter().map(|&index| &self.joins[index]);
+        free_end_share(&self.rings[rim.ring], &rim, end, beside)
+    }
+}
+
+/// The joins at each end.
+fn by_end(joins: &[Join], chords: usize) -> Vec<[Vec<usize>; 2]> {
+    let mut at_end: Vec<[Vec<usize>; 2]> = vec![[Vec::new(), Vec::new()]; chords];
+    for (index, join) in joins.iter().enumerate() {
+        for end in [join.from, join.to] {
+            at_end[end.0][end.1].push(index);
+        }
+    }
+    at_end
 }
 
 /// Grows a line from its free end over chords that are not used yet.

@@ -8,12 +8,16 @@
 //! then take exactly the area's volume: a line that ends at the rim leaves half a spacing at either
 //! end, and each join along the rim makes up for two of those halves.
 
+mod clip;
 mod concentric;
+mod field;
+mod honeycomb;
 mod link;
+mod monotonic;
 mod rectilinear;
+mod sparse;
 mod spiral;
 
-use geom::polyline::distance_to_segment;
 use geom::region::{Island, Region};
 use geom::simplify::simplify_line;
 use geom::spiral::Turning;
@@ -23,27 +27,57 @@ use self::link::JoinParams;
 use crate::bead::Bead;
 use crate::chart::Chart;
 use crate::skins::Skins;
+use crate::surface::LayerSurface;
 use crate::toolpath::Role;
 
-/// How the lines of an area run.
+/// How the lines of a sparse area run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pattern {
     /// Parallel lines, turned by 90° from layer to layer.
     Rectilinear,
+    /// Parallel lines, the same in every layer: walls.
+    AlignedRectilinear,
     /// Two sets of parallel lines in every layer, each half as dense.
     Grid,
+    /// Three sets of parallel lines that meet in points.
+    Triangles,
+    /// Three sets of parallel lines of which no three meet: triangles and hexagons.
+    Stars,
+    /// Cubes that stand on a corner.
+    Cubic,
+    /// The gyroid, a surface without straight lines that divides space in two.
+    Gyroid,
+    /// Hexagonal cells.
+    Honeycomb,
     /// Loops that follow the outline inwards.
     Concentric,
     /// The Archimedean spiral about the rotation axis.
     Archimedean,
 }
 
-impl Pattern {
+/// How the lines of a solid area run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SolidPattern {
+    /// Parallel lines, turned by 90° from layer to layer, with the least travel.
+    Rectilinear,
+    /// Parallel lines that are laid from one side of the area to the other, so that each lies
+    /// beside one that was laid before: no seam is seen where two stretches would meet.
+    Monotonic {
+        /// Whether neighbouring lines are joined at their ends.
+        joined: bool,
+    },
+    /// Loops that follow the outline inwards.
+    Concentric,
+    /// The Archimedean spiral about the rotation axis.
+    Archimedean,
+}
+
+impl SolidPattern {
     /// Returns the pattern that takes the place of this one in the solid areas of a curved layer.
     fn evenly_curved(self) -> Self {
         match self {
             Self::Concentric => Self::Concentric,
-            Self::Rectilinear | Self::Grid | Self::Archimedean => Self::Archimedean,
+            Self::Rectilinear | Self::Monotonic { .. } | Self::Archimedean => Self::Archimedean,
         }
     }
 }
@@ -56,7 +90,9 @@ pub struct InfillParams {
     /// Pattern of sparse areas.
     pub pattern: Pattern,
     /// Pattern of solid areas.
-    pub solid_pattern: Pattern,
+    pub solid_pattern: SolidPattern,
+    /// Pattern of solid areas that are seen from above.
+    pub top_pattern: SolidPattern,
     /// Direction of parallel lines, radians from the part's reference azimuth.
     pub angle: f64,
     /// Width of sparse lines, mm.
@@ -65,6 +101,8 @@ pub struct InfillParams {
     pub solid_width: f64,
     /// Width of solid lines that are seen from above, mm.
     pub top_width: f64,
+    /// The longest piece of rim that joins two lines of a sparse area, mm.
+    pub longest_join: f64,
 }
 
 /// A line of infill in the chart.
@@ -101,16 +139,28 @@ pub(crate) struct Chord {
 }
 
 /// The layer that is filled.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FillLayer {
+#[derive(Clone, Copy)]
+pub struct FillLayer<'a> {
     /// Counted from 0; patterns alternate with it.
     pub index: usize,
     /// Metric of its chart.
     pub chart: Chart,
+    /// The family that it belongs to.
+    pub surface: &'a dyn LayerSurface,
+    /// Level of its upper side, mm.
+    pub level: f64,
     /// Thickness of the beads, mm.
     pub thickness: f64,
     /// How far lines may lie from their ideal course, mm.
     pub tolerance: f64,
+}
+
+impl FillLayer<'_> {
+    /// How high the layer is at a place as seen along the axis, mm; beyond its end as high as there.
+    fn height(&self, p: &Point2<f64>) -> f64 {
+        let height = self.surface.height(self.level, p.coords.norm());
+        if height.is_finite() { height } else { self.level }
+    }
 }
 
 /// Lines shorter than this many widths are blobs and are left out.
@@ -119,87 +169,98 @@ const LEAST_LENGTH_IN_WIDTHS: f64 = 0.5;
 /// In a solid area joins are part of the filling, however long.
 const SOLID_JOINS: JoinParams = JoinParams { longest: f64::INFINITY, fill_rim: true };
 
-/// Joins along the rim of a sparse area are material that no one asked for: up to 10 mm they cost
-/// less than the travel and the retraction that they save.
-const SPARSE_JOINS: JoinParams = JoinParams { longest: 10.0, fill_rim: false };
-
 /// What fills the solid and sparse areas of an island.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Filling {
-    /// The lines.
+    /// Lines in any order.
     pub lines: Vec<FillLine>,
+    /// Lines that want to be laid one after the other, as they are.
+    pub in_order: Vec<Vec<FillLine>>,
     /// Places between lines that want a single bead of their own width.
     pub thin: Vec<Region>,
 }
 
 /// Fills the solid and sparse areas of an island.
 #[must_use]
-pub fn fill(skins: &Skins, layer: &FillLayer, params: &InfillParams) -> Filling {
+pub fn fill(skins: &Skins, layer: &FillLayer<'_>, params: &InfillParams) -> Filling {
     let mut filling = Filling::default();
-    for (region, role, width) in [
-        (&skins.solid, Role::SolidInfill, params.solid_width),
-        (&skins.top, Role::TopSolidInfill, params.top_width),
+    let angle = angle_in(layer, params);
+    let (inner, top) = (params.solid_pattern, params.top_pattern);
+    for (region, role, width, pattern) in [
+        (&skins.solid, Role::SolidInfill, params.solid_width, inner),
+        (&skins.top, Role::TopSolidInfill, params.top_width, top),
     ] {
+        let solid = Solid { role, width, pattern, angle };
         for island in region.islands() {
-            solid(island, role, width, layer, params, &mut filling);
+            solid.fill(island, layer, &mut filling);
         }
     }
     if params.density > 0.0 && !skins.sparse.is_empty() {
-        filling.lines.extend(sparse(&skins.sparse, layer, params));
+        filling.lines.extend(sparse::fill(&skins.sparse, layer, params));
     }
     filling
 }
 
 /// The direction of parallel lines in a layer.
-fn angle_in(layer: &FillLayer, params: &InfillParams) -> f64 {
+fn angle_in(layer: &FillLayer<'_>, params: &InfillParams) -> f64 {
     params.angle + if layer.index.is_multiple_of(2) { 0.0 } else { std::f64::consts::FRAC_PI_2 }
 }
 
-fn solid(
-    island: &Island,
+/// How a solid area is filled.
+struct Solid {
     role: Role,
+    /// Width of the lines, mm.
     width: f64,
-    layer: &FillLayer,
-    params: &InfillParams,
-    filling: &mut Filling,
-) {
-    let bead = Bead { width, thickness: layer.thickness };
-    let area = Region::from_island(island.clone());
-    // Straight lines of a curved chart are not equally far apart everywhere; turns of the spiral are.
-    let pattern = if layer.chart.is_flat() {
-        params.solid_pattern
-    } else {
-        params.solid_pattern.evenly_curved()
-    };
-    match pattern {
-        Pattern::Rectilinear | Pattern::Grid => {
-            let even = rectilinear::evenly(&area, bead.spacing(), angle_in(layer, params));
-            let bead = Bead::with_spacing(even.spacing, layer.thickness);
-            let (core, chords) = (&even.core, &even.chords);
-            filling.lines.extend(open_lines(core, chords, &SOLID_JOINS, role, bead, layer));
-        }
-        Pattern::Concentric => {
-            concentric(&area, role, bead, layer, filling);
-        }
-        Pattern::Archimedean => {
-            let core = layer.chart.inset(&area, bead.spacing() / 2.0);
-            // Turns of neighbouring layers lie in each other's grooves.
-            let phase = if layer.index.is_multiple_of(2) { 0.0 } else { std::f64::consts::PI };
-            let turning = turning(layer.index);
-            let chords = spiral::chords(&core, bead.spacing(), phase, turning, layer.tolerance);
-            let lines = open_lines(&core, &chords, &SOLID_JOINS, role, bead, layer);
-            match balanced(&lines, &area, layer) {
-                Some(bead) => {
-                    filling.lines.extend(lines.into_iter().map(|l| FillLine { bead, ..l }));
-                }
-                // Too narrow for turns of a fixed pitch: loops follow the outline instead.
-                None => concentric(&area, role, bead, layer, filling),
+    pattern: SolidPattern,
+    /// Direction of parallel lines, radians.
+    angle: f64,
+}
+
+impl Solid {
+    fn fill(&self, island: &Island, layer: &FillLayer<'_>, filling: &mut Filling) {
+        let bead = Bead { width: self.width, thickness: layer.thickness };
+        let area = Region::from_island(island.clone());
+        // Straight lines of a curved chart are not equally far apart everywhere; turns of the
+        // spiral are.
+        let pattern =
+            if layer.chart.is_flat() { self.pattern } else { self.pattern.evenly_curved() };
+        match pattern {
+            SolidPattern::Rectilinear => {
+                let even = rectilinear::evenly(&area, bead.spacing(), self.angle);
+                let bead = Bead::with_spacing(even.spacing, layer.thickness);
+                let (core, chords) = (&even.core, &even.chords);
+                let lines = open_lines(core, chords, &SOLID_JOINS, self.role, bead, layer);
+                filling.lines.extend(lines);
             }
+            SolidPattern::Monotonic { joined } => {
+                let even = rectilinear::evenly(&area, bead.spacing(), self.angle);
+                let bead = Bead::with_spacing(even.spacing, layer.thickness);
+                let longest = if joined { f64::INFINITY } else { 0.0 };
+                let lines = monotonic::lines(&even, &JoinParams { longest, ..SOLID_JOINS });
+                let lines = fill_lines(lines, self.role, bead, layer).collect();
+                filling.in_order.push(lines);
+            }
+            SolidPattern::Concentric => concentric(&area, self.role, bead, layer, filling),
+            SolidPattern::Archimedean => self.spiral(&area, bead, layer, filling),
+        }
+    }
+
+    fn spiral(&self, area: &Region, bead: Bead, layer: &FillLayer<'_>, filling: &mut Filling) {
+        let core = layer.chart.inset(area, bead.spacing() / 2.0);
+        // Turns of neighbouring layers lie in each other's grooves.
+        let phase = if layer.index.is_multiple_of(2) { 0.0 } else { std::f64::consts::PI };
+        let turning = turning(layer.index);
+        let chords = spiral::chords(&core, bead.spacing(), phase, turning, layer.tolerance);
+        let lines = open_lines(&core, &chords, &SOLID_JOINS, self.role, bead, layer);
+        match balanced(&lines, area, layer) {
+            Some(bead) => filling.lines.extend(lines.into_iter().map(|l| FillLine { bead, ..l })),
+            // Too narrow for turns of a fixed pitch: loops follow the outline instead.
+            None => concentric(area, self.role, bead, layer, filling),
         }
     }
 }
 
-fn concentric(area: &Region, role: Role, bead: Bead, layer: &FillLayer, filling: &mut Filling) {
+fn concentric(area: &Region, role: Role, bead: Bead, layer: &FillLayer<'_>, filling: &mut Filling) {
     let (loops, thin) = concentric::solid(area, &layer.chart, bead.spacing());
     filling.lines.extend(closed_lines(loops, role, bead));
     filling.thin.extend(thin);
@@ -210,7 +271,7 @@ const BALANCE: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 
 /// The bead with which lines take the volume of their area: turns of a fixed pitch end where the
 /// area does, and leave a little more or less than their own place. `None` where that is too much.
-fn balanced(lines: &[FillLine], area: &Region, layer: &FillLayer) -> Option<Bead> {
+fn balanced(lines: &[FillLine], area: &Region, layer: &FillLayer<'_>) -> Option<Bead> {
     let length: f64 = lines
         .iter()
         .flat_map(|line| line.points.windows(2))
@@ -227,97 +288,28 @@ fn turning(index: usize) -> Turning {
     if index.is_multiple_of(2) { Turning::CounterClockwise } else { Turning::Clockwise }
 }
 
-fn sparse(area: &Region, layer: &FillLayer, params: &InfillParams) -> Vec<FillLine> {
-    let role = Role::InternalInfill;
-    let bead = Bead { width: params.width, thickness: layer.thickness };
-    let spacing = bead.spacing() / params.density;
-    let core = layer.chart.inset(area, bead.spacing() / 2.0);
-    // Parallel lines are so as seen along the axis, where those of all layers lie over each other.
-    let from_above = layer.chart.region_from_above(&core);
-    let parallel = |spacing: f64, angle: f64| {
-        let spacing = spacing * sparseness(&layer.chart);
-        let chords = rectilinear::about_axis(&from_above, spacing, angle);
-        let mut lines = open_lines(&from_above, &chords, &SPARSE_JOINS, role, bead, layer);
-        for line in &mut lines {
-            line.points = under(&line.points, layer);
-        }
-        lines
-    };
-    match params.pattern {
-        Pattern::Rectilinear => parallel(spacing, angle_in(layer, params)),
-        Pattern::Grid => {
-            let mut lines = parallel(2.0 * spacing, params.angle);
-            lines.extend(parallel(2.0 * spacing, params.angle + std::f64::consts::FRAC_PI_2));
-            lines
-        }
-        Pattern::Concentric => {
-            let loops = concentric::sparse(area, &layer.chart, bead.spacing() / 2.0, spacing);
-            closed_lines(loops, role, bead).collect()
-        }
-        Pattern::Archimedean => {
-            // Sparse lines must stand on those of the layer below: neither phase nor sense changes.
-            let turning = Turning::CounterClockwise;
-            let chords = spiral::chords(&core, spacing, 0.0, turning, layer.tolerance);
-            open_lines(&core, &chords, &SPARSE_JOINS, role, bead, layer)
-        }
-    }
-}
-
-/// How much closer lines lie as seen along the axis than on the layer, on the average over their
-/// directions: a layer that slopes by `a` is `1/cos a` larger than it looks; lines along the slope
-/// are longer by as much, lines across it as long as they look. On spheres as at the axis, since
-/// lines of steeper and flatter layers are to lie over each other.
-fn sparseness(chart: &Chart) -> f64 {
-    match chart {
-        Chart::Cone { cos } => f64::midpoint(*cos, 1.0),
-        Chart::Plane | Chart::Sphere { .. } => 1.0,
-    }
-}
-
-/// A line seen along the axis, in the chart, with points until it is followed to within the
-/// tolerance.
-fn under(line: &[Point2<f64>], layer: &FillLayer) -> Vec<Point2<f64>> {
-    let chart = &layer.chart;
-    let mut points: Vec<Point2<f64>> = line.iter().take(1).map(|p| chart.under(p)).collect();
-    for pair in line.windows(2) {
-        let ends = [chart.under(&pair[0]), chart.under(&pair[1])];
-        under_side([pair[0], pair[1]], ends, layer, &mut points);
-        points.push(ends[1]);
-    }
-    points
-}
-
-fn under_side(
-    [a, b]: [Point2<f64>; 2],
-    ends: [Point2<f64>; 2],
-    layer: &FillLayer,
-    points: &mut Vec<Point2<f64>>,
-) {
-    let middle = nalgebra::center(&a, &b);
-    let at = layer.chart.under(&middle);
-    let is_short = (b - a).norm_squared() <= layer.tolerance * layer.tolerance;
-    if is_short || distance_to_segment(&ends[0], &ends[1], &at) <= layer.tolerance {
-        return;
-    }
-    under_side([a, middle], [ends[0], at], layer, points);
-    points.push(at);
-    under_side([middle, b], [at, ends[1]], layer, points);
-}
-
 fn open_lines(
     core: &Region,
     chords: &[Chord],
     joins: &JoinParams,
     role: Role,
     bead: Bead,
-    layer: &FillLayer,
+    layer: &FillLayer<'_>,
 ) -> Vec<FillLine> {
-    link::joined(core, chords, joins)
+    fill_lines(link::joined(core, chords, joins), role, bead, layer).collect()
+}
+
+fn fill_lines(
+    lines: Vec<Vec<Point2<f64>>>,
+    role: Role,
+    bead: Bead,
+    layer: &FillLayer<'_>,
+) -> impl Iterator<Item = FillLine> {
+    lines
         .into_iter()
         .map(|points| simplify_line(&points, layer.tolerance))
-        .filter(|points| geom::polyline::length(points) >= LEAST_LENGTH_IN_WIDTHS * bead.width)
-        .map(|points| FillLine { role, bead, closed: false, points })
-        .collect()
+        .filter(move |points| geom::polyline::length(points) >= LEAST_LENGTH_IN_WIDTHS * bead.width)
+        .map(move |points| FillLine { role, bead, closed: false, points })
 }
 
 fn closed_lines(
@@ -331,24 +323,51 @@ fn closed_lines(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::surface::{Cone, Plane, Spheres};
     use geom::region::Fill;
     use std::f64::consts::{FRAC_PI_4, TAU};
 
-    const LAYER: FillLayer =
-        FillLayer { index: 0, chart: Chart::Plane, thickness: 0.2, tolerance: 0.002 };
+    const LAYER: FillLayer<'static> = FillLayer {
+        index: 0,
+        chart: Chart::Plane,
+        surface: &Plane,
+        level: 3.1,
+        thickness: 0.2,
+        tolerance: 0.002,
+    };
 
     const PARAMS: InfillParams = InfillParams {
         density: 0.2,
         pattern: Pattern::Rectilinear,
-        solid_pattern: Pattern::Rectilinear,
+        solid_pattern: SolidPattern::Rectilinear,
+        top_pattern: SolidPattern::Rectilinear,
         angle: FRAC_PI_4,
         width: 0.45,
         solid_width: 0.45,
         top_width: 0.45,
+        longest_join: 10.0,
     };
 
-    const PATTERNS: [Pattern; 4] =
-        [Pattern::Rectilinear, Pattern::Grid, Pattern::Concentric, Pattern::Archimedean];
+    const PATTERNS: [Pattern; 10] = [
+        Pattern::Rectilinear,
+        Pattern::AlignedRectilinear,
+        Pattern::Grid,
+        Pattern::Triangles,
+        Pattern::Stars,
+        Pattern::Cubic,
+        Pattern::Gyroid,
+        Pattern::Honeycomb,
+        Pattern::Concentric,
+        Pattern::Archimedean,
+    ];
+
+    const SOLID_PATTERNS: [SolidPattern; 5] = [
+        SolidPattern::Rectilinear,
+        SolidPattern::Monotonic { joined: true },
+        SolidPattern::Monotonic { joined: false },
+        SolidPattern::Concentric,
+        SolidPattern::Archimedean,
+    ];
 
     fn polygon(points: &[[f64; 2]]) -> Region {
         let ring: Vec<Point2<f64>> = points.iter().map(|&p| Point2::from(p)).collect();
@@ -380,6 +399,7 @@ mod tests {
         let lines: f64 = filling
             .lines
             .iter()
+            .chain(filling.in_order.iter().flatten())
             .map(|line| {
                 let closing = if line.closed {
                     (line.points[0] - line.points[line.points.len() - 1]).norm()
@@ -394,7 +414,7 @@ mod tests {
 
     #[test]
     fn solid_lines_take_the_area() {
-        for pattern in PATTERNS {
+        for pattern in SOLID_PATTERNS {
             for (k, area) in areas().iter().enumerate() {
                 let skins = Skins { solid: area.clone(), ..Skins::default() };
                 for index in 0..2 {
@@ -404,10 +424,11 @@ mod tests {
                     // Turns of a spiral end where the area does, whatever the pitch; in a narrow
                     // strip that is a good part of it.
                     let slack = match pattern {
-                        Pattern::Rectilinear | Pattern::Grid => 0.01,
-                        Pattern::Concentric => 0.02,
-                        Pattern::Archimedean if k == 3 => 0.1,
-                        Pattern::Archimedean => 0.03,
+                        SolidPattern::Rectilinear => 0.01,
+                        SolidPattern::Monotonic { .. } => 0.012,
+                        SolidPattern::Concentric => 0.02,
+                        SolidPattern::Archimedean if k == 3 => 0.1,
+                        SolidPattern::Archimedean => 0.03,
                     };
                     assert!((ratio - 1.0).abs() < slack, "{pattern:?}, area {k}: {ratio}");
                 }
@@ -429,15 +450,156 @@ mod tests {
         }
     }
 
+    /// Share of an area that sparse lines take, on the average over 6 mm of height.
+    fn share_of(pattern: Pattern, density: f64, of_layer: impl Fn(f64) -> f64) -> f64 {
+        let params = InfillParams { pattern, density, ..PARAMS };
+        let area = rectangle(-30.0, -30.0, 60.0, 60.0);
+        let skins = Skins { sparse: area.clone(), ..Skins::default() };
+        let layers = 12;
+        let total: f64 = (0..layers)
+            .map(|k| {
+                let level = of_layer(0.5 * f64::from(k));
+                let layer = FillLayer { index: k as usize, level, ..LAYER };
+                laid(&fill(&skins, &layer, &params))
+            })
+            .sum();
+        total / f64::from(layers) / area.area()
+    }
+
+    /// How many sets of lines are joined along the rim each on its own.
+    fn families_of(pattern: Pattern) -> f64 {
+        match pattern {
+            Pattern::Triangles | Pattern::Stars | Pattern::Cubic => 3.0,
+            Pattern::Grid => 2.0,
+            _ => 1.0,
+        }
+    }
+
     #[test]
     fn sparse_lines_have_the_density() {
         for pattern in PATTERNS {
-            let area = rectangle(-30.0, -30.0, 60.0, 60.0);
-            let skins = Skins { sparse: area.clone(), ..Skins::default() };
+            for density in [0.1, 0.2, 0.4] {
+                let share = share_of(pattern, density, |z| z) / density;
+                // Joins along the rim come on top: up to half of a rim of 240 mm for each family of
+                // lines.
+                let rim = families_of(pattern) * 120.0 * 0.407 / 3600.0 / density;
+                assert!((0.97..1.03 + rim).contains(&share), "{pattern:?} {density}: {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn sparse_lines_have_the_density_on_cones_and_spheres() {
+        let cone = Cone::new(0.6).unwrap();
+        let spheres = Spheres::new(-120.0).unwrap();
+        let families: [&dyn LayerSurface; 2] = [&cone, &spheres];
+        let area = rectangle(-25.0, -25.0, 50.0, 50.0);
+        let skins = Skins { sparse: area.clone(), ..Skins::default() };
+        for pattern in PATTERNS {
             let params = InfillParams { pattern, ..PARAMS };
-            let share = laid(&fill(&skins, &LAYER, &params)) / area.area();
-            // Joins along the rim come on top.
-            assert!((0.19..0.23).contains(&share), "{pattern:?}: {share}");
+            for surface in families {
+                let (mut total, mut true_area) = (0.0, 0.0);
+                for k in 0..8 {
+                    let level = 30.0 + 0.7 * f64::from(k);
+                    let chart = surface.chart(level);
+                    let layer = FillLayer { index: k as usize, chart, surface, level, ..LAYER };
+                    true_area += chart.area(&area);
+                    for line in fill(&skins, &layer, &params).lines {
+                        let pieces = line.points.windows(2);
+                        let length: f64 = pieces.map(|w| chart.length(&w[0], &w[1])).sum();
+                        total += length * line.bead.spacing();
+                    }
+                }
+                let share = total / true_area / params.density;
+                let most = 1.06 + 0.07 * families_of(pattern);
+                assert!((0.95..most).contains(&share), "{pattern:?}: {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn fields_are_the_same_in_all_layers() {
+        // Every point of a line that is no join along the rim lies on a surface that is fixed in
+        // space, whatever the layer.
+        let cone = Cone::new(0.6).unwrap();
+        let bowl = Cone::new(-0.3).unwrap();
+        let spheres = Spheres::new(-40.0).unwrap();
+        let families: [&dyn LayerSurface; 4] = [&Plane, &cone, &bowl, &spheres];
+        let area = disc(9.0);
+        for pattern in [Pattern::Gyroid, Pattern::Cubic] {
+            let params = InfillParams { pattern, ..PARAMS };
+            for surface in families {
+                let level = 21.3;
+                let layer = FillLayer { chart: surface.chart(level), surface, level, ..LAYER };
+                let core = layer.chart.inset(&area, 0.25);
+                let bead = Bead { width: 0.45, thickness: 0.2 };
+                let wanted = bead.spacing() / params.density * sparse::closeness(pattern, &layer);
+                let gyroid = field::gyroid(field::gyroid_period(wanted));
+                let mut judged = 0;
+                let lines = sparse::fill(&area, &layer, &params);
+                let points = lines
+                    .iter()
+                    .flat_map(|line| line.points.windows(2))
+                    .flat_map(|w| [0.0, 0.25, 0.5].map(|share| w[0] + (w[1] - w[0]) * share));
+                for p in points.filter(|p| core.contains(p)) {
+                    let at = surface.lift(level, &p);
+                    let (sin, cos) = FRAC_PI_4.sin_cos();
+                    let turned = nalgebra::Point3::new(
+                        at.x * cos + at.y * sin,
+                        at.y * cos - at.x * sin,
+                        at.z,
+                    );
+                    let off = match pattern {
+                        // The function changes by about 1.2 in a radian.
+                        Pattern::Gyroid => gyroid(&turned).abs() * 0.8 * wanted,
+                        _ => (0..3)
+                            .map(|k| {
+                                let angle = f64::from(k) * TAU / 3.0;
+                                let across = turned.y * angle.cos() - turned.x * angle.sin();
+                                let share = (across + at.z / 2.0_f64.sqrt()) / (3.0 * wanted) - 0.5;
+                                (share - share.round()).abs() * 3.0 * wanted
+                            })
+                            .fold(f64::INFINITY, f64::min),
+                    };
+                    assert!(off < 0.05, "{pattern:?}: {off} at {at}");
+                    judged += 1;
+                }
+                assert!(judged > 12, "{pattern:?}: {judged}");
+            }
+        }
+    }
+
+    #[test]
+    fn monotonic_lines_lie_beside_earlier_ones() {
+        // A square with a round hole: behind the hole the stretches meet again.
+        let area = rectangle(-12.0, -12.0, 24.0, 24.0).difference(&disc(5.0));
+        for joined in [true, false] {
+            let top_pattern = SolidPattern::Monotonic { joined };
+            let params = InfillParams { top_pattern, angle: 0.0, ..PARAMS };
+            let skins = Skins { top: area.clone(), ..Skins::default() };
+            let filling = fill(&skins, &LAYER, &params);
+            assert!(filling.lines.is_empty() && filling.in_order.len() == 1);
+            let lines = &filling.in_order[0];
+            assert_eq!(lines.len() < 8, joined, "{} lines", lines.len());
+            // Long pieces along x in the order in which they are laid.
+            let rows: Vec<[Point2<f64>; 2]> = lines
+                .iter()
+                .flat_map(|line| line.points.windows(2))
+                .filter(|w| (w[1].x - w[0].x).abs() > 1.0 && (w[1].y - w[0].y).abs() < 1e-6)
+                .map(|w| [w[0], w[1]])
+                .collect();
+            assert!(rows.len() > 50);
+            for (k, later) in rows.iter().enumerate() {
+                for earlier in &rows[..k] {
+                    let middle = |row: &[Point2<f64>; 2]| f64::midpoint(row[0].x, row[1].x);
+                    let apart = (middle(later) - middle(earlier)).abs();
+                    let lengths =
+                        (later[0].x - later[1].x).abs() + (earlier[0].x - earlier[1].x).abs();
+                    let is_beside = apart < lengths / 2.0 - 0.5;
+                    let rises = later[0].y >= earlier[0].y - 1e-6;
+                    assert!(rises || !is_beside, "{earlier:?} before {later:?}");
+                }
+            }
         }
     }
 
@@ -454,7 +616,11 @@ mod tests {
                         assert!(grown.contains(p), "{pattern:?}: {p} is outside");
                     }
                 }
-                let limit = if pattern == Pattern::Concentric { 40 } else { 12 };
+                let limit = match pattern {
+                    Pattern::Concentric => 40,
+                    Pattern::Triangles | Pattern::Stars | Pattern::Cubic => 24,
+                    _ => 16,
+                };
                 assert!(lines.len() <= limit, "{pattern:?}: {} lines", lines.len());
             }
         }
@@ -466,16 +632,18 @@ mod tests {
         // along the rim lies in one of the planes of the pattern.
         let charts =
             [Chart::Sphere { radius: 20.0 }, Chart::Sphere { radius: 31.0 }, Chart::cone(0.6)];
+        let spheres = Spheres::new(-1.0).unwrap();
         for pattern in [Pattern::Rectilinear, Pattern::Grid] {
             let params = InfillParams { pattern, ..PARAMS };
             for chart in charts {
-                let layer = FillLayer { chart, ..LAYER };
+                let layer = FillLayer { chart, surface: &spheres, ..LAYER };
                 let area = disc(9.0);
                 let core = chart.inset(&area, 0.25);
                 let bead = Bead { width: 0.45, thickness: 0.2 };
                 let share = if pattern == Pattern::Grid { 2.0 } else { 1.0 };
-                let pitch = share * bead.spacing() / params.density * sparseness(&chart);
-                let lines = sparse(&area, &layer, &params);
+                let pitch =
+                    share * bead.spacing() / params.density * sparse::closeness(pattern, &layer);
+                let lines = sparse::fill(&area, &layer, &params);
                 let mut judged = 0;
                 let places = lines
                     .iter()

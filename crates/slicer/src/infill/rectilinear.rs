@@ -10,19 +10,20 @@ use super::{Chord, RimPoint};
 /// are found would be a matter of rounding.
 const OFF_RIM_MM: f64 = 1e-3;
 
-/// Returns lines `spacing` apart whose pattern is fixed to the axis: the axis lies midway between
-/// two of them, so that no line grazes it and lines of all layers stand on each other.
-pub(super) fn about_axis(core: &Region, spacing: f64, angle: f64) -> Vec<Chord> {
-    let rows = Rows { first: spacing / 2.0, spacing, count: None };
-    chords(core, &rows, angle)
+/// Returns lines `spacing` apart whose pattern is fixed to the axis: the first lies `first` mm from
+/// it. Lines of all layers then stand on each other.
+pub(super) fn rows_at(core: &Region, first: f64, spacing: f64, angle: f64) -> Vec<Chord> {
+    chords(core, &Rows { first, spacing, count: None }, angle).0
 }
 
 /// Lines that fill an area evenly.
 pub(super) struct Even {
     /// Where they run: half a spacing inside the area.
     pub(super) core: Region,
-    /// The lines.
+    /// The lines, by row and then along it.
     pub(super) chords: Vec<Chord>,
+    /// The row of each, and where it begins and ends along it, mm.
+    pub(super) rows: Vec<(i64, [f64; 2])>,
     /// Their distance, mm.
     pub(super) spacing: f64,
 }
@@ -49,8 +50,9 @@ pub(super) fn evenly(area: &Region, wanted: f64, angle: f64) -> Even {
     } else {
         Rows { first: low, spacing: (high - low) / gaps, count: Some(gaps as i64 + 1) }
     };
-    let chords = chords(&core, &rows, angle);
-    Even { core, chords, spacing: rows.spacing }
+    let spacing = rows.spacing;
+    let (chords, rows) = chords(&core, &rows, angle);
+    Even { core, chords, rows, spacing }
 }
 
 /// The narrowest and the widest that a line alone in its area may be, as shares of its spacing.
@@ -99,7 +101,7 @@ struct Crossing {
     rim: RimPoint,
 }
 
-fn chords(core: &Region, rows: &Rows, angle: f64) -> Vec<Chord> {
+fn chords(core: &Region, rows: &Rows, angle: f64) -> (Vec<Chord>, Vec<(i64, [f64; 2])>) {
     let to_rows = Rotation2::new(-angle);
     let mut crossings = Vec::new();
     for (ring, points) in core.rings().enumerate() {
@@ -125,10 +127,11 @@ fn chords(core: &Region, rows: &Rows, angle: f64) -> Vec<Chord> {
         .filter(|pair| pair[0].row == pair[1].row)
         .map(|pair| {
             let v = rows.first + pair[0].row as f64 * rows.spacing;
-            Chord {
+            let chord = Chord {
                 points: [&pair[0], &pair[1]].map(|c| back * Point2::new(c.along, v)).to_vec(),
                 ends: [Some(pair[0].rim), Some(pair[1].rim)],
-            }
+            };
+            (chord, (pair[0].row, [pair[0].along, pair[1].along]))
         })
-        .collect()
+        .unzip()
 }
