@@ -251,6 +251,26 @@ fn base(job: &Job) -> Stage {
     }
 }
 
+/// The least level of a bowl above the floor: the first layer is as thick as the others at the rim
+/// that the part has there, and no sliver that no bead fits in.
+fn least_of_bowls(part: &Mesh, surface: &dyn LayerSurface, floor: f64) -> f64 {
+    // The level of bowls is least at corners of what stands above the floor.
+    let mut least = f64::INFINITY;
+    for triangle in &part.triangles {
+        for k in 0..3 {
+            let [a, b] = [k, (k + 1) % 3].map(|k| part.vertices[triangle[k] as usize]);
+            if a.z >= floor {
+                least = least.min(surface.level(&a));
+            }
+            if (a.z < floor) != (b.z < floor) {
+                let at = a.lerp(&b, (floor - a.z) / (b.z - a.z));
+                least = least.min(surface.level(&at));
+            }
+        }
+    }
+    if least.is_finite() { least } else { surface.level(&Point3::new(0.0, 0.0, floor)) }
+}
+
 fn curved(
     part: &Mesh,
     surface: Box<dyn LayerSurface>,
@@ -263,7 +283,11 @@ fn curved(
     // The level grows or falls outwards all the way, so that its least value on the floor is at
     // one end; its greatest in the part is at a vertex, or, of bowls, at most that of the top on
     // the axis. Layers that turn out empty are left out later.
-    let least = level(0.0, floor).min(level(radius, floor));
+    let least = if surface.form().is_mirrored() {
+        least_of_bowls(part, &*surface, floor)
+    } else {
+        level(0.0, floor).min(level(radius, floor))
+    };
     let greatest = part.vertices.iter().map(|p| surface.level(p)).fold(level(0.0, top), f64::max);
     let step = surface.level_step(job.schedule.layer_height);
     let count = ((greatest - least) / step).ceil().max(1.0);

@@ -76,6 +76,22 @@ pub(crate) struct Piece {
     pub(crate) stroke: u32,
 }
 
+impl Piece {
+    /// Whether a place of its upper side that lies within its width as seen from above does so along
+    /// the layer, too.
+    fn reaches(&self, place: &Point3<f64>) -> bool {
+        if self.family == Family::Planar {
+            return true;
+        }
+        let [from, to] = self.ends;
+        let (along, aside) = (to - from, place - from);
+        let square = along.norm_squared();
+        let share = if square > 0.0 { aside.dot(&along) / square } else { 0.0 };
+        let off = aside - along * share.clamp(0.0, 1.0);
+        off.norm_squared() <= self.half_width * self.half_width
+    }
+}
+
 /// What a piece came to lie on, in cells.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Footing {
@@ -150,6 +166,11 @@ pub(crate) trait Underside {
 /// Half: below, the bead is squeezed out by half; above, it still touches what sags.
 const TOUCHING: f64 = 0.5;
 
+/// Ground that is tilted against a bead, as a flat floor is under a wedge, lies below one side of it
+/// and above the other, and what is too much there fills what is missing here. So much may be missing
+/// on the whole, as a share of the bead's thickness.
+const TILTED: f64 = 0.1;
+
 /// From the upper side of a bead to the middle of the layer below, in thicknesses.
 pub(crate) const HALFWAY_DOWN: f64 = 1.5;
 
@@ -211,6 +232,8 @@ impl Pile {
         let least = from.xy().inf(&to.xy()).map(|c| c - piece.half_width);
         let most = from.xy().sup(&to.xy()).map(|c| c + piece.half_width);
         let mut footing = Footing::default();
+        // How far the ground lies below the bottom, over all cells; less where it lies above.
+        let mut lacking = 0.0;
         for row in self.index(least.y)..=self.index(most.y) {
             for column in self.index(least.x)..=self.index(most.x) {
                 let at = Point2::new(self.middle(column), self.middle(row));
@@ -225,20 +248,23 @@ impl Pile {
                     Family::Planar => foot.z,
                     family => family.height(family.level(&foot), at.coords.norm()),
                 };
-                if top.is_finite() {
+                let top = Point3::new(at.x, at.y, top);
+                if top.z.is_finite() && piece.reaches(&top) {
                     let own = footing.own;
-                    self.lay_cell([column, row], top, piece, &mut footing);
-                    let top = Point3::new(at.x, at.y, top);
-                    if let Some(depth) = self.gap_under(&(top + down), piece) {
-                        if footing.own == own {
-                            let below = top + down * HALFWAY_DOWN;
-                            self.openings.push(Opening { below, depth });
-                        }
-                    } else {
+                    self.lay_cell([column, row], top.z, piece, &mut footing);
+                    let depth = self.gap_under(&(top + down), piece);
+                    lacking += depth.max(-TOUCHING * piece.thickness);
+                    if depth <= TOUCHING * piece.thickness {
                         footing.resting += 1;
+                    } else if footing.own == own {
+                        let below = top + down * HALFWAY_DOWN;
+                        self.openings.push(Opening { below, depth });
                     }
                 }
             }
+        }
+        if lacking <= TILTED * piece.thickness * f64::from(footing.covered) {
+            self.openings.clear();
         }
         footing
     }
@@ -274,14 +300,13 @@ impl Pile {
         self.greatest = self.greatest.max(top);
     }
 
-    /// How far below the bottom of a bead the next thing lies, mm; `None` where it rests.
-    fn gap_under(&self, bottom: &Point3<f64>, piece: &Piece) -> Option<f64> {
+    /// How far below the bottom of a bead the next thing lies, mm; negative where it rises above.
+    fn gap_under(&self, bottom: &Point3<f64>, piece: &Piece) -> f64 {
         let (column, row) = (self.index(bottom.x), self.index(bottom.y));
         let tile = &self.tiles[row / TILE * self.side + column / TILE];
         let cell = tile.as_ref().map_or(BARE, |tile| tile.cells[row % TILE * TILE + column % TILE]);
         let under = if cell.layer == piece.layer { cell.under } else { cell.top };
-        let gap = bottom.z - f64::from(under);
-        (gap > TOUCHING * piece.thickness).then_some(gap)
+        bottom.z - f64::from(under)
     }
 
     /// Returns the true shape of a piece.
@@ -396,6 +421,48 @@ mod tests {
         // The same line once more covers nothing new.
         pile.lay(&piece(3.0, 0.6, 2, 3));
         assert_eq!(pile.openings(), []);
+    }
+
+    #[test]
+    fn beads_on_a_slope_are_as_wide_as_on_a_plane() {
+        // Lines along the contour of a cone, side by side on it: half as far apart from above.
+        let family = Family::Conical { slope: 3.0_f64.sqrt() };
+        let mut pile = Pile::new(50.0);
+        let mut lay = |s: f64, stroke: u32| {
+            let at = |y: f64| {
+                let r = (30.0 + 0.5 * s).hypot(y);
+                Point3::new(30.0 + 0.5 * s, y, family.height(80.0, r))
+            };
+            let ends = [at(-0.2), at(0.2)];
+            pile.lay(&Piece { ends, family, ..piece(0.0, 0.0, 3, stroke) })
+        };
+        let first = lay(0.0, 0);
+        // A disc and a rectangle of 0.4 mm, seen under 60°.
+        let area = 0.5 * (0.4 * 0.45 + std::f64::consts::PI * 0.225 * 0.225);
+        let covered = f64::from(first.covered) * CELL * CELL;
+        assert!((covered / area - 1.0).abs() < 0.2, "{covered} {area}");
+        let beside = lay(0.45, 1);
+        assert!(beside.taken_share() < 0.2, "{beside:?}");
+        assert!(lay(0.0, 2).taken_share() > 0.9);
+    }
+
+    #[test]
+    fn a_wedge_is_filled_and_a_hole_beside_it_is_not() {
+        let family = Family::Conical { slope: 1.0 };
+        let lay = |pile: &mut Pile, thickness: f64, r: f64, layer: u32| {
+            let at = |y: f64| Point3::new(r, y, 0.2 + thickness * 2.0_f64.sqrt() / 2.0);
+            let ends = [at(-0.2), at(0.2)];
+            pile.lay(&Piece { ends, thickness, family, ..piece(0.0, 0.0, layer, layer) });
+            pile.openings().len()
+        };
+        let mut floor = Pile::new(50.0);
+        for k in -5..=5 {
+            floor.lay(&piece(0.4 * f64::from(k), 0.2, 0, 0));
+        }
+        // 45° against the floor: as deep as 0.09 mm at one side, and 0.41 mm at the other.
+        assert_eq!(lay(&mut floor, 0.25, 3.0, 1), 0);
+        // Without the floor, and as thick as if there were one, it is hollow on the whole.
+        assert!(lay(&mut Pile::new(50.0), 0.25, 3.0, 1) > 0);
     }
 
     #[test]
