@@ -52,6 +52,8 @@ pub(crate) struct Watch<'a> {
     part: Option<Columns<'a>>,
     /// For parts that are meant to be solid.
     hollow: Option<Hollow>,
+    /// Those of a piece that belong to the part.
+    openings: Vec<Opening>,
 }
 
 /// How far lines may begin from the end of the one before and still go on, mm: the last places.
@@ -81,6 +83,7 @@ impl<'a> Watch<'a> {
             clear: Clear::new(printer),
             part: setup.mesh.map(Columns::new),
             hollow: setup.solid.then(Hollow::default),
+            openings: Vec::new(),
         }
     }
 
@@ -179,7 +182,9 @@ impl<'a> Watch<'a> {
         // Where the layer below is as thick; without a mesh, what the bead is for tells.
         let belongs =
             |opening: &&Opening| part.map_or(is_inside, |part| part.winding(&opening.below) != 0);
-        hollow.piece(&step, self.pile.openings().iter().filter(belongs));
+        self.openings.clear();
+        self.openings.extend(self.pile.openings().iter().filter(belongs));
+        hollow.piece(&step, &self.openings, self.thickness);
     }
 
     /// Returns whether the place halfway down the layer below belongs to the part; without a mesh,

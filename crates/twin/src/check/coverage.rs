@@ -19,6 +19,11 @@ pub const MOST_HOLLOW: f64 = 0.05;
 /// And at least this much of it, mm²: a bead of 0.45 mm that is missing over 4 mm.
 pub const LEAST_AREA: f64 = 2.0;
 
+/// Ground that is tilted against a bead, as a flat floor is under a wedge, lies below one side of it
+/// and above the other, and what is too much there fills what is missing here. So much may be missing
+/// on the whole, as a share of the bead's thickness.
+const TILTED: f64 = 0.1;
+
 /// Sums the hollow space under each layer.
 #[derive(Debug, Default)]
 pub(crate) struct Hollow {
@@ -30,12 +35,17 @@ pub(crate) struct Hollow {
 }
 
 impl Hollow {
-    /// A bead goes on by a piece over these openings into the part.
-    pub(crate) fn piece<'a>(&mut self, step: &Step, openings: impl Iterator<Item = &'a Opening>) {
+    /// A bead `thickness` thick goes on by a piece over these openings into the part.
+    pub(crate) fn piece(&mut self, step: &Step, openings: &[Opening], thickness: f64) {
         let footing = &step.footing;
         self.covered += u64::from(footing.covered - footing.own);
+        let lacking: f64 = openings.iter().map(|opening| opening.depth).sum();
+        let cells = f64::from(footing.resting) + openings.len() as f64;
+        if footing.lacking + lacking <= TILTED * thickness * cells {
+            return;
+        }
         let mut open = 0;
-        for opening in openings {
+        for opening in openings.iter().filter(|opening| opening.is_new) {
             open += 1;
             self.sum += opening.depth * CELL * CELL;
         }
@@ -91,14 +101,31 @@ mod tests {
                     ..Footing::default()
                 };
                 let step = Step { line, layer: None, ends, footing, is_inside: true };
-                let opening = Opening { below: Point3::origin(), depth: 0.1 };
-                check.piece(&step, vec![opening; open as usize].iter());
+                let opening = Opening { below: Point3::origin(), depth: 0.2, is_new: true };
+                check.piece(&step, &vec![opening; open as usize], 0.2);
             }
             check.end_of_layer(&mut findings);
             findings.kept().len()
         };
         // 4 % are open, then 10 %; ground that a line covers again makes neither more nor less.
-        assert_eq!([layer(10, 0), layer(10, 100), layer(25, 0), layer(25, 100)], [0, 0, 1, 2]);
-        assert!((check.sum() - 20.0 * 0.1 * CELL * CELL * 70.0).abs() < 1e-12);
+        assert_eq!([layer(10, 0), layer(10, 20), layer(25, 0), layer(25, 20)], [0, 0, 1, 2]);
+        assert!((check.sum() - 20.0 * 0.2 * CELL * CELL * 70.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_too_much_on_one_side_fills_the_other() {
+        let hollow = |lacking: f64| {
+            let mut check = Hollow::default();
+            let footing = Footing { covered: 20, resting: 12, lacking, ..Footing::default() };
+            let ends = [Point3::origin(), Point3::new(0.5, 0.0, 0.0)];
+            let step = Step { line: 1, layer: None, ends, footing, is_inside: true };
+            let opening = Opening { below: Point3::origin(), depth: 0.13, is_new: true };
+            check.piece(&step, &[opening; 8], 0.2);
+            check.sum()
+        };
+        // A wedge: as much as is missing in eight cells rises above the bottom in the others.
+        assert_eq!(hollow(-8.0 * 0.13), 0.0);
+        // Flat ground beside a hole.
+        assert!((hollow(0.0) - 8.0 * 0.13 * CELL * CELL).abs() < 1e-12);
     }
 }
