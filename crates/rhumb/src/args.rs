@@ -66,6 +66,8 @@ pub enum ErrorFormat {
 pub enum Command {
     /// Turn a model into a program for the printer
     Slice(Box<Slice>),
+    /// Turn many models into programs; what was done before is not done again
+    Batch(Box<Batch>),
     /// Say what is in a mesh and what a repair would do
     Inspect(Inspect),
     /// List the ways to lay a model down, and write it turned
@@ -242,6 +244,17 @@ pub struct Slice {
     /// Write the mesh exactly as it was sliced
     #[arg(long, value_name = "FILE.stl")]
     pub export_placed: Option<PathBuf>,
+    /// How much work it may be
+    #[command(flatten)]
+    pub effort: Effort,
+    /// Stop when standard input ends
+    #[arg(long, hide = true)]
+    pub stop_at_end_of_input: bool,
+}
+
+/// How much work a slice may be.
+#[derive(Debug, Clone, Args)]
+pub struct Effort {
     /// How far to check the finished program: all that is quick, or support, overlap and clearance
     /// of every bead too
     #[arg(long, value_enum, default_value_t = Proof::Quick)]
@@ -252,6 +265,39 @@ pub struct Slice {
     /// Refuse models whose facets are cut by layers more often than this, in millions: work for hours
     #[arg(long, value_name = "MILLIONS", default_value_t = 1000.0)]
     pub most_cuts: f64,
+}
+
+/// Arguments of `batch`.
+#[derive(Debug, Args)]
+pub struct Batch {
+    /// Models; of a folder all in it
+    #[arg(required = true, value_name = "MODEL")]
+    pub models: Vec<PathBuf>,
+    /// Where programs and reports go: MODEL.gcode, MODEL.json and batch.json
+    #[arg(long, value_name = "DIR")]
+    pub out_dir: PathBuf,
+    /// How many models are sliced at the same time; each takes its own memory
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: u16,
+    /// Slice only every N-th model, beginning with the K-th: one share of the work for each of N
+    /// machines
+    #[arg(long, value_name = "K/N")]
+    pub shard: Option<String>,
+    /// Give a model up after so many seconds
+    #[arg(long, value_name = "SECONDS")]
+    pub time_limit: Option<f64>,
+    /// The surface that layers follow
+    #[command(flatten)]
+    pub layers: LayerArguments,
+    /// How the models are placed
+    #[command(flatten)]
+    pub place: PlaceArguments,
+    /// Which settings to use
+    #[command(flatten)]
+    pub settings: SettingsArguments,
+    /// How much work it may be
+    #[command(flatten)]
+    pub effort: Effort,
 }
 
 /// How far a program is checked.

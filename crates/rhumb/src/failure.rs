@@ -99,6 +99,24 @@ impl Failure {
         self.class
     }
 
+    /// The class of this name, if there is one.
+    #[must_use]
+    pub fn known_class(name: &str) -> Option<&'static str> {
+        CLASSES.iter().map(|(class, _)| *class).find(|class| *class == name)
+    }
+
+    /// What, where, measured and limit.
+    #[must_use]
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// What the user can do.
+    #[must_use]
+    pub fn advice(&self) -> Option<&str> {
+        self.hint.as_deref()
+    }
+
     /// The exit status of the process.
     #[must_use]
     pub fn exit_status(&self) -> u8 {

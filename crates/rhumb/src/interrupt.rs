@@ -25,6 +25,16 @@ impl Interrupt {
         interrupt
     }
 
+    /// Raises it too when standard input ends: whoever started this process is gone then.
+    pub fn raise_at_end_of_input(&self) {
+        let raised = Arc::clone(&self.0);
+        std::thread::spawn(move || {
+            // What comes in is of no interest.
+            let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+            raised.store(true, Ordering::Relaxed);
+        });
+    }
+
     /// Lets a file that grows beyond what the user may write be a failed write, as on a full disk,
     /// and not the end of the process.
     pub fn outlive_limits_of_size() {

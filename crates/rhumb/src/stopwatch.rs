@@ -13,6 +13,12 @@ impl Stopwatch {
         Self(Instant::now())
     }
 
+    /// Returns the seconds since the last lap began.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.0.elapsed().as_secs_f64()
+    }
+
     /// Returns the milliseconds since the last lap, and begins a new one.
     pub fn lap(&mut self) -> f64 {
         let now = Instant::now();

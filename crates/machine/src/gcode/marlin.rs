@@ -44,6 +44,10 @@ const LEAST_PIECE_MM: f64 = 0.5;
 /// `DEFAULT_SEGMENTS_PER_SECOND`.
 const PIECES_PER_SECOND: f64 = 180.0;
 
+/// How much lower a speed is written that must not be exceeded, as a share: what rounding to a tenth of
+/// mm/min and single precision may do to fast ones.
+const ROUNDING: f64 = 1e-5;
+
 /// How long a line takes: `words / F`, and what is beyond the reach of `F`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Law {
@@ -79,24 +83,25 @@ impl Marlin {
     /// Returns the speed to be written for a line that should last `duration` s, mm/s. Of a line
     /// within the fast radius it is the speed that is wanted, for what that is worth.
     pub(super) fn speed(&self, way: &Way, duration: f64) -> f64 {
-        let mut count = most_pieces(way);
-        loop {
+        let most = most_pieces(way);
+        // Factors only slow down, so that at least this many pieces are made.
+        let fewest = pieces(way, way.words / duration);
+        for count in fewest..=most {
             let law = self.law(way, count);
             if law.obeying == 0.0 {
-                return way.words / duration;
+                break;
             }
-            let speed = law.words / (duration * law.obeying);
-            let needed = pieces(way, speed);
-            if needed == count {
+            // No faster than lines that have so many pieces.
+            let highest = match count {
+                1 => f64::INFINITY,
+                _ => PIECES_PER_SECOND * way.words / f64::from(count) * (1.0 - ROUNDING),
+            };
+            let speed = (law.words / (duration * law.obeying)).min(highest);
+            if pieces(way, speed) == count {
                 return speed;
             }
-            if needed > count {
-                // With more pieces it would be too slow, and with this many the speed is too high for
-                // them: the highest that has one more.
-                return PIECES_PER_SECOND * way.words / f64::from(count + 1);
-            }
-            count = needed;
         }
+        way.words / duration
     }
 
     /// Returns how long a line at this speed (mm/s) takes, s.
@@ -230,6 +235,17 @@ mod tests {
                 let room = if speed < 90.0 { 1e-9 } else { 0.05 };
                 assert!((took / wanted - 1.0).abs() <= room, "{from:?} {to:?} {speed}: {took}");
             }
+        }
+    }
+
+    #[test]
+    fn no_word_makes_a_line_faster_than_wanted() {
+        // 128 mm in a hundredth of a second: one piece would be too fast, and two are just not made.
+        let way = way([75.216, 0.0], [-9.079, -96.523]);
+        for wanted in [0.01, 0.02, 0.05, 0.3, 1.0, 10.0] {
+            let word = (MARLIN.speed(&way, wanted) * 600.0).floor() / 600.0;
+            let took = MARLIN.duration(&way, word);
+            assert!(took >= wanted * (1.0 - 1e-5), "{took} s, not {wanted}");
         }
     }
 

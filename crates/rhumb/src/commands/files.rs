@@ -53,6 +53,8 @@ impl Files {
             Command::Motor(a) => files.writes(&a.output),
             Command::Model(a) => files.writes(&a.output),
             Command::Calibrate(calibrate) => files.of_calibration(calibrate),
+            // Its outputs are looked at by each slice.
+            Command::Batch(a) => files.reads_settings(&a.settings),
             Command::Inspect(_) | Command::Verify(_) | Command::Send(_) | Command::Profile(_) => {
                 files
             }

@@ -1,5 +1,6 @@
 //! The commands, one a file. Each returns the exit status of a run that went through.
 
+mod batch;
 mod calibrate;
 mod convert;
 mod files;
@@ -45,6 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     files::check(&arguments.command)?;
     match &arguments.command {
         Command::Slice(arguments) => slice::run(arguments, manner),
+        Command::Batch(arguments) => batch::run(arguments, manner),
         Command::Inspect(arguments) => inspect::run(arguments, manner),
         Command::Orient(arguments) => orient::run(arguments, manner),
         Command::Convert(arguments) => convert::run(arguments, manner),

@@ -24,11 +24,14 @@ use crate::summary;
 
 pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     let interrupt = Interrupt::on_signals();
+    if arguments.stop_at_end_of_input {
+        interrupt.raise_at_end_of_input();
+    }
     let mut total = Stopwatch::start();
     let mut wanted = arguments.settings.clone();
     wanted.set.extend(arguments.layers.set());
     let (settings, mut job) = settings(&wanted)?;
-    job.most_cuts = arguments.most_cuts * 1e6;
+    job.most_cuts = arguments.effort.most_cuts * 1e6;
     let wish = wish(&arguments.place)?;
     let target = target(arguments);
     let model = input::read(&arguments.model)?;
@@ -62,13 +65,13 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
         outcome
     };
     drop(model);
-    let verdict = if arguments.no_verify {
+    let verdict = if arguments.effort.no_verify {
         None
     } else {
         progress.stage("verify", 1);
         let mut lap = Stopwatch::start();
         let text = BufReader::new(out.reread()?);
-        let full = arguments.verify == Proof::Full;
+        let full = arguments.effort.verify == Proof::Full;
         let verdict = check(text, &job, Some(pipeline::part(&outcome)), full, |_| {})?;
         outcome.timings.verify = lap.lap();
         Some(verdict)

@@ -276,7 +276,7 @@ mod tests {
         let run = |is_paced: bool| {
             let (mut check, mut findings) = (Acceleration::new(&printer()), Findings::default());
             for (from, to) in [(20.0, 25.0), (25.0, 26.0), (26.0, 21.0)] {
-                let mut segment = polar_segment([from, 0.0], [to, 0.0], 40.0);
+                let mut segment = polar_segment([from, 0.0], [to, 0.0], 60.0);
                 segment.is_paced = is_paced && from == 25.0;
                 check.segment(&segment, &Doubt::of(&segment), &mut findings);
             }
