@@ -676,6 +676,7 @@ M84
 ; perimeters = 2
 ; external_perimeters_first = 0
 ; seam_position = nearest
+; seam_angle = 90
 ; external_perimeter_extrusion_width = 0.45
 ; perimeter_extrusion_width = 0.45
 ; infill_extrusion_width = 0.45

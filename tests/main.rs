@@ -28,6 +28,7 @@ mod relief;
 mod rotation;
 mod roundtrip;
 mod run;
+mod seam;
 mod send;
 mod settings;
 mod shared;

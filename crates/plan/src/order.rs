@@ -12,7 +12,7 @@ use nalgebra::{Point2, Point3, distance};
 use slicer::bead::Bead;
 use slicer::toolpath::{IslandPaths, LayerPaths, Role, Station, Toolpath, WallGroup};
 
-use crate::seam::{SeamMemory, SeamPosition, nearest};
+use crate::seam::{Begin, SeamMemory, SeamPosition, nearest};
 
 /// How lines are put in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,8 +145,9 @@ impl Ordering<'_> {
     /// The walls along one outline, all begun next to the seam of the external one.
     fn walls(&mut self, group: &WallGroup) {
         let external = &group.loops[0];
-        let seam = self.seams.choose(&plane(external), &self.nozzle, self.params.seam);
-        let seam_at = external.stations[seam].at.xy();
+        let line = plane(external);
+        let seam = self.seams.choose(&line, &self.nozzle, self.params.seam);
+        let seam_at = seam.on(&line);
         let behind = group.loops[1..].iter().map(|path| begun_near(path, &seam_at));
         let mut lines: Vec<OrderedLine> =
             std::iter::once(begun_at(external, seam)).chain(behind).collect();
@@ -172,7 +173,7 @@ impl Ordering<'_> {
 
     fn closed_from_nearest(&mut self, path: &Toolpath) {
         let (start, _) = nearest(&plane(path), &self.nozzle);
-        self.push(begun_at(path, start));
+        self.push(begun_at(path, Begin::at(start)));
     }
 
     fn push(&mut self, mut line: OrderedLine) {
@@ -216,11 +217,32 @@ fn plane(path: &Toolpath) -> Vec<Point2<f64>> {
 }
 
 /// A closed line begun at one of its stations.
-fn begun_at(path: &Toolpath, start: usize) -> OrderedLine {
-    let mut stations: Vec<Station> =
-        path.stations[start..].iter().chain(&path.stations[..=start]).copied().collect();
+fn begun_at(path: &Toolpath, begin: Begin) -> OrderedLine {
+    let Begin { after, share } = begin;
+    let all = &path.stations;
+    let mut stations: Vec<Station> = Vec::with_capacity(all.len() + 2);
+    if share > 0.0 {
+        let between = between(&all[after], &all[(after + 1) % all.len()], share);
+        stations.push(between);
+        stations.extend(all[after + 1..].iter().chain(&all[..=after]));
+        stations.push(between);
+    } else {
+        stations.extend(all[after..].iter().chain(&all[..=after]));
+    }
     stations.dedup_by(|a, b| a.at == b.at && a.bead == b.bead);
     OrderedLine { role: path.role, stations, island: None }
+}
+
+/// The station at a share of the way from one to the next.
+fn between(a: &Station, b: &Station, share: f64) -> Station {
+    let blend = |from: f64, to: f64| from + (to - from) * share;
+    Station {
+        at: Point3::from(a.at.coords.lerp(&b.at.coords, share)),
+        bead: Bead {
+            width: blend(a.bead.width, b.bead.width),
+            thickness: blend(a.bead.thickness, b.bead.thickness),
+        },
+    }
 }
 
 /// Pieces shorter than this strain firmwares and show nothing, mm.
@@ -261,25 +283,10 @@ fn begun_near(path: &Toolpath, target: &Point2<f64>) -> OrderedLine {
     for corner in [place.side, (place.side + 1) % points.len()] {
         // A begin this near to a corner moves into it.
         if distance(&points[corner], &place.at) < SHORTEST_PIECE_MM {
-            return begun_at(path, corner);
+            return begun_at(path, Begin::at(corner));
         }
     }
-    let (from, to) =
-        (path.stations[place.side], path.stations[(place.side + 1) % path.stations.len()]);
-    let blend = |a: f64, b: f64| a + (b - a) * place.share;
-    let start = Station {
-        at: Point3::from(from.at.coords.lerp(&to.at.coords, place.share)),
-        bead: Bead {
-            width: blend(from.bead.width, to.bead.width),
-            thickness: blend(from.bead.thickness, to.bead.thickness),
-        },
-    };
-    let next = place.side + 1;
-    let mut stations = vec![start];
-    stations.extend(path.stations[next..].iter().chain(&path.stations[..next]));
-    stations.push(start);
-    stations.dedup_by(|a, b| a.at == b.at);
-    OrderedLine { role: path.role, stations, island: None }
+    begun_at(path, Begin { after: place.side, share: place.share })
 }
 
 /// Above this many fills the improvement, which is quadratic, is left out.

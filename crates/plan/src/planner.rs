@@ -116,6 +116,7 @@ impl<'a> Planner<'a> {
     #[must_use]
     pub fn new(printer: &'a Printer, mut params: PlanParams) -> Self {
         params.resample.dialect = params.resample.dialect.on(printer);
+        params.order.seam = params.order.seam.seen_from(params.resample.azimuth);
         let resampler = Resampler::new(printer, params.resample);
         let resampler = if params.curved { resampler.on_near_side() } else { resampler };
         let printed = params.curved.then(|| Printed::nothing(printer.rail.max));

@@ -802,8 +802,16 @@ pub const KEYS: &[Key] = &[
     choice(
         Print,
         "seam_position",
-        &["nearest", "aligned"],
-        "where walls begin: where the nozzle is nearest (least travel), or above the seam below",
+        &["nearest", "aligned", "rear", "random", "corner"],
+        "where walls begin: where the nozzle is nearest (least travel), above the seam below, farthest \
+         towards seam_angle_deg, anywhere, or in the sharpest corner that points into the part",
+    ),
+    number(
+        Print,
+        "seam_angle_deg",
+        "seam_angle",
+        (90.0, -360.0, 360.0),
+        "direction of the seams with seam_position = rear, on the bed from its x axis",
     ),
     number(
         Print,

@@ -444,6 +444,9 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
         order: OrderParams {
             seam: match get.text("seam_position") {
                 "nearest" => SeamPosition::Nearest,
+                "rear" => SeamPosition::Rear(get.number("seam_angle_deg").to_radians()),
+                "random" => SeamPosition::Random,
+                "corner" => SeamPosition::Corner,
                 _ => SeamPosition::Aligned,
             },
             external_first: get.switch("external_perimeters_first"),
