@@ -675,6 +675,7 @@ M84
 ; cusp_area_share = 0%
 ; perimeters = 2
 ; external_perimeters_first = 0
+; avoid_crossing_perimeters = 0
 ; seam_position = nearest
 ; seam_angle = 90
 ; external_perimeter_extrusion_width = 0.45

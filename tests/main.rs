@@ -10,6 +10,7 @@ mod batch;
 mod budgets;
 mod bundled;
 mod cli;
+mod comb;
 mod comparison;
 mod corpus;
 mod corpus_made;

@@ -10,6 +10,7 @@
 //! layer by layer.
 
 pub mod axis;
+mod comb;
 pub mod cooling;
 pub mod follow;
 pub mod order;

@@ -1,7 +1,7 @@
 //! Strokes over the part become moves of the joints.
 //!
 //! A move is straight in joint space, which over the part is a piece of a spiral. A stroke is cut into
-//! as few as lie within the chord tolerance of it ([`division`]): the deviation is measured with the
+//! as few as lie within the chord tolerance of it (`division`): the deviation is measured with the
 //! forward kinematics at a quarter, half and three quarters of each piece, and the bed turns by at
 //! most 60° in one move; any alignment is covered.
 //!

@@ -9,6 +9,7 @@ use nalgebra::{Point3, distance};
 use slicer::bead::Bead;
 use slicer::toolpath::{LayerPaths, Role, Station};
 
+use crate::comb::Comb;
 use crate::order::OrderedLine;
 use crate::printed::Printed;
 
@@ -69,6 +70,9 @@ pub struct FilamentParams {
     pub retract_lift: f64,
     /// How far the nozzle runs back along the line while the filament is drawn back, mm.
     pub wipe: f64,
+    /// Whether travel within an island keeps inside of it, and how far from its outlines, mm. On flat
+    /// layers; curved ones have heights of their own to look out for.
+    pub comb: Option<f64>,
 }
 
 /// What a stroke does.
@@ -174,10 +178,16 @@ impl Router {
             height: layer.thickness,
         })));
         let mut last_island = None;
+        // Combs of islands, made when they are wanted.
+        let mut combs: Vec<Option<Comb>> = vec![None; layer.islands.len()];
         for line in lines {
             let same_island = line.island.is_some() && line.island == last_island;
             let inside = line.island.filter(|_| same_island).map(|i| &layer.islands[i].outline);
-            self.travel(line.stations[0].at, inside, speeds.travel, filament);
+            let to = line.stations[0].at;
+            let comb = line.island.filter(|_| same_island).and_then(|i| combs.get_mut(i));
+            if !self.combed(&to, inside.zip(comb), speeds.travel, filament) {
+                self.travel(to, inside, speeds.travel, filament);
+            }
             self.line(line, layer.index == 0, speeds, filament);
             last_island = line.island;
         }
@@ -239,6 +249,29 @@ impl Router {
             self.stroke(Kind::Filament, to, filament.retract_length, filament.retract_speed);
             self.retracted = false;
         }
+    }
+
+    /// Goes to the begin of a line inside the island of the last one, though the straight way leaves it;
+    /// returns whether there is such a way.
+    fn combed(
+        &mut self,
+        to: &Point3<f64>,
+        island: Option<(&Region, &mut Option<Comb>)>,
+        speed: f64,
+        filament: &FilamentParams,
+    ) -> bool {
+        let (Some(keep), Some((outline, comb))) = (filament.comb, island) else { return false };
+        let is_flat = self.printed.is_none() && self.at.z == to.z && !self.retracted;
+        let from = self.at.xy();
+        if !is_flat || outline.contains_segment(&from, &to.xy()) {
+            return false;
+        }
+        let comb = comb.get_or_insert_with(|| Comb::new(outline, keep));
+        let Some(way) = comb.way(&from, &to.xy()) else { return false };
+        for p in way {
+            self.stroke(Kind::Travel, Point3::new(p.x, p.y, to.z), 0.0, speed);
+        }
+        true
     }
 
     /// Rises to `height`, crosses, and comes down.
@@ -423,6 +456,7 @@ mod tests {
         retract_before_travel: 2.0,
         retract_lift: 0.2,
         wipe: 0.0,
+        comb: None,
     };
 
     fn line(points: &[[f64; 2]], z: f64) -> OrderedLine {

@@ -799,6 +799,15 @@ pub const KEYS: &[Key] = &[
         program_name: "external_perimeters_first",
         meaning: "whether the outermost wall comes before those behind it",
     },
+    Key {
+        name: "avoid_crossing_perimeters",
+        section: Print,
+        kind: Kind::Switch,
+        default: Default::Switch(false),
+        program_name: "avoid_crossing_perimeters",
+        meaning: "whether travel inside an island goes round its holes and notches, with the filament ready, \
+                  instead of across them; on flat layers",
+    },
     choice(
         Print,
         "seam_position",

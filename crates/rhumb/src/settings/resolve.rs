@@ -437,6 +437,9 @@ fn solid_pattern(word: &str) -> SolidPattern {
     }
 }
 
+/// How far combed travel keeps from outlines, as a share of the width of the outermost bead.
+const COMB_SHARE: f64 = 0.4;
+
 fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanParams {
     let curved = layers(get) != LayerKind::Planar;
     let diameter = get.number("filament_diameter_mm");
@@ -472,6 +475,10 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
             retract_before_travel: get.number("retract_before_travel_mm"),
             retract_lift: get.number("retract_lift_mm"),
             wipe: get.number("wipe_mm"),
+            // Within the half of the outermost bead, so that its own ends are inside.
+            comb: get
+                .switch("avoid_crossing_perimeters")
+                .then(|| COMB_SHARE * get.number("external_perimeter_extrusion_width_mm")),
         },
         resample: ResampleParams {
             chord: tolerances.chord_mm(),
