@@ -67,6 +67,7 @@ fn filled(model: &Model, covers: &[Region], job: &Job) -> usize {
             floor: None,
             ceiling: None,
             stair: None,
+            below: None,
         };
         fill_layer(&lift, material, &neighbours, &job.paths).paths.islands.len()
     };

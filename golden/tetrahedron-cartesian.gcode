@@ -721,6 +721,7 @@ M84
 ; sphere_centre = -60
 ; cap_radius = 100
 ; base_layers = 2
+; blend = none
 ; top = curved
 ; layer_height = 0.2
 ; first_layer_height = 0.2

@@ -183,6 +183,77 @@ fn flat_tops_are_finished_by_planar_layers() {
     }
 }
 
+/// What a program announces as the surface of each layer, with the layer's number.
+fn surfaces(text: &str) -> Vec<(usize, String)> {
+    let mut surface = String::new();
+    let mut found = Vec::new();
+    for line in text.lines() {
+        if let Some(named) = line.strip_prefix("; layer surface = ") {
+            surface = named.to_owned();
+        } else if let Some(layer) = line.strip_prefix(";LAYER:") {
+            found.push((layer.parse().unwrap(), surface.clone()));
+        }
+    }
+    found
+}
+
+#[test]
+fn cones_grow_out_of_planes() {
+    for (name, angle) in [("dome", 30.0), ("gear", -20.0_f64)] {
+        let cone = angle.to_string();
+        let mut arguments = vec!["--layers=conical", "--cone-angle", &cone, "--set=blend=morph"];
+        arguments.extend(["--set", "fill_density=100%", "--set", "skirts=0"]);
+        arguments.extend(SLIM);
+        let (report, code) = proved(name, &arguments);
+        assert_eq!(code, 0, "{name}: {}", report["verify"]);
+        let text = sliced(name, &arguments);
+        let motions = motions(&text);
+        let surfaces = surfaces(&text);
+        let mut angles = Vec::new();
+        for (layer, surface) in &surfaces[BASE_LAYERS..] {
+            let angle: f64 = surface.strip_prefix("conical, angle ").unwrap().parse().unwrap();
+            let slope = angle.to_radians().tan();
+            let beads = motions.iter().filter(|m| m.lays() && m.layer == Some(*layer));
+            let levels = beads.flat_map(|m| [m.at(0.0), m.at(0.5), m.at(1.0)]);
+            let levels = levels.filter(|[x, y, _]| x.hypot(*y) > TIP_MM);
+            let levels: Vec<f64> = levels.map(|[x, y, z]| z + slope * x.hypot(y)).collect();
+            let (low, high) =
+                levels.iter().fold((f64::MAX, f64::MIN), |(a, b), &l| (a.min(l), b.max(l)));
+            assert!(high - low < 2.0 * OFF_SURFACE_MM, "{name}, layer {layer}: {low} to {high}");
+            angles.push(angle.abs());
+        }
+        // From flat to the cone without a step, then on and on; and as many layers as it takes when
+        // beads are half to one and a half layers thick.
+        let last = angle.abs();
+        let laid_at = motions.iter().filter(|m| m.lays()).map(|m| m.to[0].abs());
+        let reach = laid_at.fold(0.0, f64::max);
+        let least = reach * last.to_radians().tan().asinh() / 0.2;
+        let blended = angles.iter().take_while(|angle| **angle < last - 0.01).count() + 1;
+        assert!((blended as f64 - least).abs() < 2.5, "{name}: {blended} layers, {least}");
+        assert!(angles.len() > blended + 3, "{name}: {} layers", angles.len());
+        assert!(angles.is_sorted() && angles[0] < 2.0 && angles.last() == Some(&last));
+        let wanted = stl_volume(&std::fs::read(model(name)).unwrap());
+        let error = laid(&text) / wanted - 1.0;
+        assert!(error.abs() <= 0.015, "{name}: {:+.2} %", error * 100.0);
+        let spacing = 0.45 - 0.2 * (1.0 - std::f64::consts::FRAC_PI_4);
+        let beads = motions.iter().filter(|m| m.lays() && m.role == "Perimeter");
+        for bead in beads.filter(|m| m.path() > 0.3 && m.layer < Some(BASE_LAYERS + blended)) {
+            let thickness = bead.volume() / bead.path() / spacing;
+            assert!((0.095..0.305).contains(&thickness), "{name}: a bead {thickness} thick");
+        }
+    }
+}
+
+#[test]
+fn blends_that_cannot_be_are_refused() {
+    let scratch = Scratch::new();
+    let dome = model("dome");
+    let mut arguments = vec!["slice", dome.to_str().unwrap(), "-o", "out.gcode"];
+    arguments.extend(["--layers=conical", "--cone-angle=10", "--set=blend=morph"]);
+    arguments.extend(["--set=min_layer_height_mm=0.2", "--set=max_layer_height_mm=0.2"]);
+    scratch.run(&arguments).refused("OutOfEnvelope", 5);
+}
+
 /// The report of a model sliced with the full proof, and how it ended.
 fn proved(name: &str, layers: &[&str]) -> (serde_json::Value, i32) {
     let (scratch, model) = (Scratch::new(), model(name));

@@ -33,6 +33,7 @@
 
 pub mod args;
 pub mod base64;
+mod blend;
 pub mod calibration;
 pub mod check;
 pub mod clock;

@@ -255,9 +255,8 @@ fn layers(
     watch.progress.stage("slice", count as u64);
     for (index, stage) in stages.iter().enumerate() {
         let below = index.checked_sub(1).map(|below| &stages[below]);
-        if stages.len() > 1 {
-            let surface = format!("{SURFACE_REMARK}{}", stage.kind.describe());
-            write(text, &[Step::Remark(surface)])?;
+        if stages.len() > 1 && stage.morph.is_none() {
+            write(text, &[surface_remark(stage, stage.printed.start)])?;
         }
         let mut stack = Stack::new(solid, stage, below, job);
         for start in stage.printed.clone().step_by(WINDOW) {
@@ -270,6 +269,9 @@ fn layers(
                 // Layers of one stage may pass beside the part, above or below it.
                 if filled.paths.is_empty() && stages.len() > 1 {
                     continue;
+                }
+                if stage.morph.is_some() {
+                    write(text, &[surface_remark(stage, k)])?;
                 }
                 filled.paths.index = printed.levels.len();
                 printed.count(&filled, &stage.levels[k]);
@@ -294,6 +296,10 @@ fn layers(
 
 /// How a program says which surface the following layers lie on.
 pub const SURFACE_REMARK: &str = "layer surface = ";
+
+fn surface_remark(stage: &Stage, k: usize) -> Step {
+    Step::Remark(format!("{SURFACE_REMARK}{}", stage.describe(k)))
+}
 
 fn nothing_to_print(layers: usize, job: &Job) -> Failure {
     Failure::new(

@@ -7,6 +7,9 @@
 //! finish it: the first of them fills the wedges between the curved layers and its own plane, and
 //! the last ends on the face.
 //!
+//! With `blend = morph` cones do not begin as wedges: between base and cones lie layers that are each a
+//! little steeper than the one below, as many as the limits of a layer's thickness ask for.
+//!
 //! A stage knows more levels than it prints: what lies beyond is cut all the same, because it
 //! decides where the printed ones are bottoms and tops. The base is part of the same solid, so its
 //! layers and the curved ones need not know of each other.
@@ -20,9 +23,10 @@ use nalgebra::Point3;
 use slicer::clearance::{LayerOrder, Uphill, steepest_slope};
 use slicer::level::Level;
 use slicer::lift::LEAST_WEDGE_SHARE;
-use slicer::stacking::Stair;
+use slicer::stacking::{Side, Stair};
 use slicer::surface::{Caps, Cone, Extent, LayerSurface, Plane, Spheres, SurfaceError};
 
+use crate::blend;
 use crate::failure::Failure;
 use crate::levels::{self, Layout, MetFlat};
 use crate::settings::Job;
@@ -89,22 +93,41 @@ pub struct Stage {
     pub floor: Option<f64>,
     /// The height that the printed ones end at, mm; `None` where the part ends them.
     pub ceiling: Option<f64>,
+    /// The sides of all layers, from the lowest up, where each has a surface of its own.
+    pub morph: Option<Vec<Side>>,
 }
 
 impl Stage {
     /// What the curved layers of this stage are to a planar layer on top of them; `None` for other
     /// stages.
     pub(crate) fn stair(&self, first: &Level) -> Option<Stair<'_>> {
-        let (floor, ceiling) = (self.floor?, self.ceiling?);
+        let ceiling = self.ceiling?;
         let level = self.levels.get(self.printed.start)?;
         Some(Stair {
             surface: &*self.surface,
             level: level.upper,
             step: level.thickness(),
-            floor,
+            floor: self.floor.unwrap_or(f64::NEG_INFINITY),
             top: first.upper,
             least: first.upper - ceiling,
         })
+    }
+
+    /// The highest place of the layers printed, within `radius` of the axis, mm.
+    fn height_within(&self, radius: f64) -> f64 {
+        let Some(last) = self.printed.end.checked_sub(1).and_then(|last| self.levels.get(last))
+        else {
+            return 0.0;
+        };
+        self.surface.height(last.upper, radius).max(last.upper)
+    }
+
+    /// What layer `k` is called in the program.
+    pub(crate) fn describe(&self, k: usize) -> String {
+        match &self.morph {
+            Some(sides) => LayerKind::Conical(sides[k + 1].cone.angle()).describe(),
+            None => self.kind.describe(),
+        }
     }
 }
 
@@ -125,6 +148,7 @@ pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure>
             levels,
             floor: None,
             ceiling: None,
+            morph: None,
         };
         return Ok((vec![planar], layout));
     }
@@ -133,10 +157,17 @@ pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure>
     surface.fits(&extent(part)).map_err(|error| unfit(&error))?;
     let base = base(job);
     let floor = base.printed.end.checked_sub(1).map_or(0.0, |last| base.levels[last].upper);
-    let mut curved = Stage { kind, ..curved(part, surface, floor, job)? };
+    let blended = blend::stage(part, kind, floor, job)?;
+    // Where the cones begin on the axis, when they do not begin on the floor.
+    let start = blended.as_ref().and_then(|stage| stage.levels.get(stage.printed.end - 1));
+    let start = start.map(|last| last.upper);
+    let mut curved = Stage { kind, ..curved(part, surface, (floor, start), job)? };
+    let stand = blended.as_ref().map_or(floor, |stage| stage.height_within(extent(part).radius));
+    let below: Vec<Stage> = std::iter::once(base).chain(blended).collect();
+    let all = |more: Vec<Stage>| below.into_iter().chain(more).collect();
     let top = flat_top(&layout, part).filter(|_| job.planar_top);
-    let Some(finish) = top.and_then(|top| finish(top, floor, job)) else {
-        return Ok((vec![base, curved], Layout { flats: Vec::new(), ..layout }));
+    let Some(finish) = top.and_then(|top| finish(top, stand, job)) else {
+        return Ok((all(vec![curved]), Layout { flats: Vec::new(), ..layout }));
     };
     let first = &finish.levels[finish.printed.start];
     curved.ceiling = Some(first.upper - LEAST_WEDGE_SHARE * first.thickness());
@@ -144,7 +175,7 @@ pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure>
     let on_top = |met: &&MetFlat| is_top(met, part);
     let flats = layout.flats.iter().filter(on_top).map(|met| MetFlat { miss: 0.0, ..*met });
     let layout = Layout { flats: flats.collect(), ..layout };
-    Ok((vec![base, curved, finish], layout))
+    Ok((all(vec![curved, finish]), layout))
 }
 
 /// How far a flat face may lie from the highest point of the part and be its top, mm: what its own
@@ -174,7 +205,15 @@ fn finish(top: f64, floor: f64, job: &Job) -> Option<Stage> {
         .map(|k| Level { index: job.base_layers.max(1) + k, lower: bound(k), upper: bound(k + 1) })
         .collect();
     let kind = LayerKind::Planar;
-    Some(Stage { surface: Box::new(Plane), kind, levels, printed, floor: None, ceiling: None })
+    Some(Stage {
+        surface: Box::new(Plane),
+        kind,
+        levels,
+        printed,
+        floor: None,
+        ceiling: None,
+        morph: None,
+    })
 }
 
 /// Fewer curved layers than this between floor and planar top are not worth it.
@@ -220,11 +259,11 @@ fn within_clearance(solid: &Solid, job: &Job) -> Result<LayerKind, Failure> {
     }))
 }
 
-fn unfit(error: &SurfaceError) -> Failure {
+pub(crate) fn unfit(error: &SurfaceError) -> Failure {
     Failure::new("OutOfEnvelope", error.to_string())
 }
 
-fn extent(part: &Mesh) -> Extent {
+pub(crate) fn extent(part: &Mesh) -> Extent {
     let radius = part.vertices.iter().map(|p| p.x.hypot(p.y)).fold(0.0, f64::max);
     Extent { lowest: part.bounds().min.z, radius }
 }
@@ -248,6 +287,7 @@ fn base(job: &Job) -> Stage {
         printed: 0..job.base_layers,
         floor: None,
         ceiling: None,
+        morph: None,
     }
 }
 
@@ -274,7 +314,7 @@ fn least_of_bowls(part: &Mesh, surface: &dyn LayerSurface, floor: f64) -> f64 {
 fn curved(
     part: &Mesh,
     surface: Box<dyn LayerSurface>,
-    floor: f64,
+    (floor, start): (f64, Option<f64>),
     job: &Job,
 ) -> Result<Stage, Failure> {
     let Extent { radius, .. } = extent(part);
@@ -283,7 +323,9 @@ fn curved(
     // The level grows or falls outwards all the way, so that its least value on the floor is at
     // one end; its greatest in the part is at a vertex, or, of bowls, at most that of the top on
     // the axis. Layers that turn out empty are left out later.
-    let least = if surface.form().is_mirrored() {
+    let least = if let Some(start) = start {
+        start
+    } else if surface.form().is_mirrored() {
         least_of_bowls(part, &*surface, floor)
     } else {
         level(0.0, floor).min(level(radius, floor))
@@ -304,5 +346,7 @@ fn curved(
             upper: bound(k + 1),
         })
         .collect();
-    Ok(Stage { surface, kind: job.layers, levels, printed, floor: Some(floor), ceiling: None })
+    // Cones that go on from a blend have no wedges.
+    let floor = if start.is_none() { Some(floor) } else { None };
+    Ok(Stage { surface, kind: job.layers, levels, printed, floor, ceiling: None, morph: None })
 }

@@ -11,7 +11,7 @@ use nalgebra::{Point2, Point3, center};
 
 use crate::bead::Bead;
 use crate::level::Level;
-use crate::stacking::{Stair, WedgeRule};
+use crate::stacking::{Side, Stair, WedgeRule};
 use crate::surface::LayerSurface;
 use crate::toolpath::Station;
 
@@ -44,6 +44,8 @@ pub struct Lift<'a> {
     pub ceiling: Option<f64>,
     /// The curved layers that a planar one lies on.
     pub stair: Option<Stair<'a>>,
+    /// The layer below, where it is another surface than this one lifted.
+    pub below: Option<Side>,
 }
 
 impl Lift<'_> {
@@ -58,6 +60,9 @@ impl Lift<'_> {
     pub fn thickness(&self, at: &Point3<f64>) -> f64 {
         if let Some(stair) = &self.stair {
             return stair.thickness(at.x.hypot(at.y));
+        }
+        if let Some(below) = &self.below {
+            return below.depth(self.surface, at);
         }
         let step = self.level.thickness();
         let full = step * self.surface.thickness_per_level(at);
@@ -112,7 +117,8 @@ impl Lift<'_> {
 
     /// Whether lines stay straight and beads as thick as the layer.
     fn is_even(&self) -> bool {
-        self.floor.is_none() && self.stair.is_none() && self.surface.form().is_flat()
+        let is_plain = self.floor.is_none() && self.stair.is_none() && self.below.is_none();
+        is_plain && self.surface.form().is_flat()
     }
 
     fn station(&self, uv: &Point2<f64>, bead: Bead) -> Station {
@@ -207,7 +213,8 @@ mod tests {
     #[test]
     fn flat_lines_keep_their_points() {
         let level = Level { index: 3, lower: 0.6, upper: 0.8 };
-        let lift = Lift { surface: &Plane, level, floor: None, ceiling: None, stair: None };
+        let lift =
+            Lift { surface: &Plane, level, floor: None, ceiling: None, stair: None, below: None };
         let stations = lift.stations(&line(&[[-8.0, 1.0], [8.0, 1.0], [0.0, 9.0]]), true);
         assert_eq!(stations.len(), 3);
         assert!(stations.iter().all(|s| s.bead == BEAD && s.at.z == 0.8));
@@ -220,7 +227,8 @@ mod tests {
         let families: [(&dyn LayerSurface, f64); 2] = [(&cone, 0.5_f64.cos()), (&spheres, 1.0)];
         for (surface, cos) in families {
             let level = Level { index: 0, lower: 20.0, upper: 20.0 + 0.2 / cos };
-            let lift = Lift { surface, level, floor: None, ceiling: None, stair: None };
+            let lift =
+                Lift { surface, level, floor: None, ceiling: None, stair: None, below: None };
             let stations = lift.stations(&line(&[[-12.0, 3.0], [9.0, 3.0], [4.0, -11.0]]), false);
             assert!((20..400).contains(&stations.len()), "{}", stations.len());
             for pair in stations.windows(2) {
@@ -240,7 +248,14 @@ mod tests {
         let cone = Cone::new(angle).unwrap();
         let step = 0.2 / angle.cos();
         let level = Level { index: 0, lower: 5.0 - step, upper: 5.0 };
-        let lift = Lift { surface: &cone, level, floor: Some(0.4), ceiling: None, stair: None };
+        let lift = Lift {
+            surface: &cone,
+            level,
+            floor: Some(0.4),
+            ceiling: None,
+            stair: None,
+            below: None,
+        };
         let at = |z: f64| Point3::new((5.0 - z) / angle.tan(), 0.0, z);
         assert!((lift.thickness(&at(3.0)) - 0.2).abs() < 1e-6);
         // tau of 0.15 mm: 0.13 mm above the floor.

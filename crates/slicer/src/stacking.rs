@@ -132,6 +132,34 @@ pub fn depth(surface: &dyn LayerSurface, p: &Point3<f64>, base: f64) -> f64 {
     (p.z - base) / surface.slope_cos(p)
 }
 
+/// A side of a layer of a [`blend`]: a cone and where it lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Side {
+    /// The cone.
+    pub cone: Cone,
+    /// Its height on the axis, mm.
+    pub level: f64,
+}
+
+impl Side {
+    /// Returns the side halfway between this one and another.
+    ///
+    /// # Errors
+    ///
+    /// [`SurfaceError::NotFinite`] when either slope is none.
+    pub fn halfway(&self, to: &Self) -> Result<Self, SurfaceError> {
+        let slope = f64::midpoint(self.cone.slope(), to.cone.slope());
+        let level = f64::midpoint(self.level, to.level);
+        Ok(Self { cone: Cone::from_slope(slope)?, level })
+    }
+
+    /// Returns how far this side lies below the point `at` of a layer, along the normal of that, mm.
+    #[must_use]
+    pub fn depth(&self, surface: &dyn LayerSurface, at: &Point3<f64>) -> f64 {
+        (at.z - self.cone.height(self.level, at.x.hypot(at.y))) * surface.slope_cos(at)
+    }
+}
+
 /// One layer of a [`blend`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlendLayer {

@@ -59,7 +59,25 @@ pub struct Segment {
     pub is_paced: bool,
 }
 
+/// Segments shorter than this have too few digits of filament to tell their thickness, mm.
+const TELLING: f64 = 0.1;
+
 impl Segment {
+    /// Returns the thickness of a bead of the announced width that takes the filament of this one, of
+    /// the given cross-section (mm²), mm; `None` for what is too short to tell.
+    #[must_use]
+    pub fn thickness(&self, filament_area: f64) -> Option<f64> {
+        const ROUNDING: f64 = 1.0 - std::f64::consts::FRAC_PI_4;
+        if self.path < TELLING {
+            return None;
+        }
+        // area = t·(w − t·(1 − π/4)), the smaller root.
+        let area = self.filament * filament_area / self.path;
+        let width = self.width;
+        let square = width * width - 4.0 * ROUNDING * area;
+        Some(2.0 * area / (width + square.max(0.0).sqrt()))
+    }
+
     /// Returns what it does.
     #[must_use]
     pub fn kind(&self) -> Kind {

@@ -59,9 +59,6 @@ pub(crate) struct Watch<'a> {
 /// How far lines may begin from the end of the one before and still go on, mm: the last places.
 const SAME_PLACE: f64 = 3.0 * rounding::LENGTH;
 
-/// Pieces shorter than this have too few digits of filament to tell their thickness, mm.
-const TELLING: f64 = 0.1;
-
 /// A bead thicker than this many layers is a blob whose thickness says nothing.
 const THICKEST: f64 = 2.0;
 
@@ -196,19 +193,13 @@ impl<'a> Watch<'a> {
         part.winding(&(middle - normal * (HALFWAY_DOWN * self.thickness))) != 0
     }
 
-    /// The thickness of a bead of the announced width that takes the filament of a segment, mm.
     fn thickness_of(&self, segment: &Segment, mark: &LayerMark) -> f64 {
-        const ROUNDING: f64 = 1.0 - std::f64::consts::FRAC_PI_4;
         let height = mark.height.unwrap_or_default();
-        if segment.path < TELLING {
-            return self.thickness;
+        match segment.thickness(self.filament_area) {
+            Some(thickness) if thickness > 0.0 && thickness < THICKEST * height => thickness,
+            Some(_) => height,
+            None => self.thickness,
         }
-        // area = t·(w − t·(1 − π/4)), the smaller root.
-        let area = segment.filament * self.filament_area / segment.path;
-        let width = segment.width;
-        let square = width * width - 4.0 * ROUNDING * area;
-        let thickness = 2.0 * area / (width + square.max(0.0).sqrt());
-        if thickness > 0.0 && thickness < THICKEST * height { thickness } else { height }
     }
 
     fn at(&self, segment: &Segment, share: f64) -> Point3<f64> {

@@ -163,7 +163,7 @@ impl<'a> Verifier<'a> {
             surface: Surface::new(printer),
             flow: Flow::new(printer, meant, setup.volume_per_second / setup.multiplier),
             volume: Volume::new(meant, printer.nozzle_diameter),
-            deposit: Deposit::new(printer, setup.coarse),
+            deposit: Deposit::new(printer, meant, setup.coarse),
             watch: setup.thorough.then(|| Watch::new(&setup)),
             part: mesh.map(Part::new),
             setup,

@@ -734,6 +734,13 @@ pub const KEYS: &[Key] = &[
     count(Print, "base_layers", (2, 0, 1000), "planar layers under curved ones"),
     choice(
         Print,
+        "blend",
+        &["none", "morph"],
+        "whether conical layers begin as wedges on the planar ones, or grow out of them, each a little \
+         steeper and half to one and a half layers thick",
+    ),
+    choice(
+        Print,
         "top",
         &["curved", "planar"],
         "whether the flat face on top of a part in curved layers is left to them, which shows as \

@@ -55,6 +55,8 @@ pub struct Job {
     pub nozzle: NozzleProfile,
     /// Planar layers under curved ones.
     pub base_layers: usize,
+    /// Whether conical layers grow out of the planar ones.
+    pub morph: bool,
     /// Whether planar layers finish the flat top of a part in curved ones.
     pub planar_top: bool,
     /// Where layers lie.
@@ -119,6 +121,7 @@ impl Job {
                 block_radius: get.number("nozzle_block_radius_mm"),
             },
             base_layers: get.count("base_layers"),
+            morph: get.text("blend") == "morph",
             planar_top: get.text("top") == "planar",
             schedule: schedule(&get)?,
             paths: paths(&get, &printer, &tolerances),

@@ -5,7 +5,7 @@ use geom::polyline::{distance_to_segment, share_nearest};
 use geom::region::{Fill, Region, Ring, ring_sides};
 use nalgebra::Point2;
 
-use crate::surface::LayerSurface;
+use crate::surface::{Cone, LayerSurface};
 
 /// How far the image of a straight side may lie from its chords, mm: layers that are compared are
 /// known to about as much.
@@ -32,6 +32,26 @@ pub fn carried(surface: &dyn LayerSurface, region: &Region, from: f64, to: f64) 
         return region.clone();
     }
     image_of(region, |p| carried_point(surface, p, from, to))
+}
+
+/// Returns what the normals through a region of a cone cover on another, steeper or flatter one, both
+/// in the charts of their cones. `distance` is how far the normals lead at a distance from the axis,
+/// mm.
+#[must_use]
+pub fn carried_to_cone(
+    region: &Region,
+    [from, to]: [&Cone; 2],
+    distance: impl Fn(f64) -> f64,
+) -> Region {
+    let (from_cos, to_cos, sin) = (from.angle().cos(), to.angle().cos(), to.angle().sin());
+    image_of(region, |p| {
+        let s = p.coords.norm();
+        if s == 0.0 {
+            return *p;
+        }
+        let r = s * from_cos;
+        p * ((r + distance(r) * sin).max(0.0) / to_cos / s)
+    })
 }
 
 /// Returns the image of a region under a map that keeps the order of places and bends sides gently;

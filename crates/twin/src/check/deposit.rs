@@ -64,6 +64,8 @@ struct Sample {
     /// From the middle to the left along the layer, of length 1.
     side: Vector3<f64>,
     half_width: f64,
+    /// Half the thickness of the bead.
+    half_height: f64,
 }
 
 /// Samples the outermost beads of a layer.
@@ -77,11 +79,14 @@ pub(crate) struct Deposit {
     layer: Option<usize>,
     family: Family,
     alignment: Alignment,
+    filament_area: f64,
     top: f64,
     /// Half the thickness of the layer, mm.
     half_height: f64,
     /// What lines may lie farther off than is usual, mm.
     coarse: f64,
+    /// The same of the last bead.
+    half_of_last: f64,
     /// Whether the layer can be judged.
     is_sound: bool,
 }
@@ -90,8 +95,8 @@ impl Deposit {
     /// Returns the check for this printer, of a program whose lines may lie so much farther off than
     /// is usual, mm.
     #[must_use]
-    pub(crate) fn new(printer: &Printer, coarse: f64) -> Self {
-        Self { alignment: printer.alignment, coarse, ..Self::default() }
+    pub(crate) fn new(printer: &Printer, filament_area: f64, coarse: f64) -> Self {
+        Self { alignment: printer.alignment, filament_area, coarse, ..Self::default() }
     }
 
     /// Begins a layer.
@@ -101,6 +106,7 @@ impl Deposit {
         (self.layer, self.top) = (Some(mark.index), mark.top.unwrap_or_default());
         self.family = mark.family.unwrap_or_default();
         self.half_height = mark.height.unwrap_or_default() / 2.0;
+        self.half_of_last = self.half_height;
         self.is_sound = mark.top.is_some() && mark.height.is_some();
     }
 
@@ -123,15 +129,31 @@ impl Deposit {
         if self.seen.is_multiple_of(self.every) {
             self.thin_out();
         }
+        let half_height = self.half_height_of(segment);
         if self.seen.is_multiple_of(self.every) {
             self.samples.push(Sample {
                 line: segment.line,
                 middle,
                 side: aside / length,
                 half_width: segment.width / 2.0,
+                half_height,
             });
         }
         self.seen += 1;
+    }
+
+    /// Half the thickness of a bead: curved layers are thinner or thicker in places. What is too short
+    /// to tell is like the bead before, and what is too thick for any bead like its layer.
+    fn half_height_of(&mut self, segment: &Segment) -> f64 {
+        let of_layer = self.half_height;
+        if self.family == Family::Planar {
+            return of_layer;
+        }
+        if let Some(thickness) = segment.thickness(self.filament_area) {
+            let is_sound = thickness > 0.0 && thickness < 4.0 * of_layer;
+            self.half_of_last = if is_sound { thickness / 2.0 } else { of_layer };
+        }
+        self.half_of_last
     }
 
     /// Makes room for one more sample.
@@ -179,7 +201,7 @@ impl Deposit {
             // Along the layer, which near the apex of a cone is far from straight.
             let at = |aside: f64| {
                 let p = self.family.walk(&sample.middle, &sample.side, aside);
-                p - self.family.normal(&p) * self.half_height
+                p - self.family.normal(&p) * sample.half_height
             };
             let is_outside = |aside: f64| solid.columns.winding(&at(aside)) == 0;
             let Some(sign) =
@@ -192,7 +214,7 @@ impl Deposit {
             if !exceeds(out, STICK_OUT + SLACK + self.coarse) {
                 continue;
             }
-            let severity = if exceeds(out, 2.0 * self.half_height) {
+            let severity = if exceeds(out, 2.0 * sample.half_height) {
                 Severity::Error
             } else {
                 Severity::Warning
