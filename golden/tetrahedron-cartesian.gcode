@@ -712,6 +712,7 @@ M84
 ; retract_lift = 0.2
 ; wipe_distance = 0
 ; fan_speed = 100%
+; bridge_fan_speed = 100%
 ; disable_fan_first_layers = 1
 ; slowdown_below_layer_time = 8
 ; min_print_speed = 10
@@ -733,7 +734,8 @@ M84
 ; cusp_area_share = 0%
 ; perimeters = 2
 ; external_perimeters_first = 0
-; avoid_crossing_perimeters = 0
+; only_one_perimeter_top = 0
+; extra_perimeters = 0
 ; seam_position = nearest
 ; seam_angle = 90
 ; external_perimeter_extrusion_width = 0.45
@@ -763,6 +765,12 @@ M84
 ; solid_infill_speed = 50
 ; top_solid_infill_speed = 35
 ; gap_fill_speed = 25
+; bridge_speed = 30
+; bridge_flow_ratio = 1
+; overhang_speed_0 = 15
+; overhang_speed_1 = 20
+; overhang_speed_2 = 25
+; overhang_speed_3 = 0
 ; first_layer_speed = 20
 ; travel_speed = 120
 ; gcode_resolution = 0.002

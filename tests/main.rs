@@ -25,6 +25,7 @@ mod names;
 mod outputs;
 mod preview;
 mod program;
+mod quality;
 mod relief;
 mod rotation;
 mod roundtrip;

@@ -115,30 +115,45 @@ pub enum Role {
     ExternalPerimeter,
     /// A wall behind it.
     Perimeter,
+    /// A wall more than half of which the layer below does not carry.
+    OverhangPerimeter,
     /// Sparse infill.
     InternalInfill,
     /// Solid infill that ends up inside or on the bed.
     SolidInfill,
     /// Solid infill that is seen from above.
     TopSolidInfill,
+    /// Solid infill that spans a gap.
+    BridgeInfill,
+    /// A second, thin run over what is seen from above.
+    Ironing,
     /// A bead between walls, of the width that is left there.
     GapFill,
     /// Skirt or brim.
     SkirtBrim,
+    /// What carries overhangs and is broken away.
+    SupportMaterial,
+    /// The layers of it next to the part.
+    SupportInterface,
     /// Anything else, such as priming.
     Custom,
 }
 
 impl Role {
     /// All roles, in the order of reports.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 13] = [
         Self::ExternalPerimeter,
         Self::Perimeter,
+        Self::OverhangPerimeter,
         Self::InternalInfill,
         Self::SolidInfill,
         Self::TopSolidInfill,
+        Self::BridgeInfill,
+        Self::Ironing,
         Self::GapFill,
         Self::SkirtBrim,
+        Self::SupportMaterial,
+        Self::SupportInterface,
         Self::Custom,
     ];
 
@@ -148,13 +163,24 @@ impl Role {
         match self {
             Self::ExternalPerimeter => "External perimeter",
             Self::Perimeter => "Perimeter",
+            Self::OverhangPerimeter => "Overhang perimeter",
             Self::InternalInfill => "Internal infill",
             Self::SolidInfill => "Solid infill",
             Self::TopSolidInfill => "Top solid infill",
+            Self::BridgeInfill => "Bridge infill",
+            Self::Ironing => "Ironing",
             Self::GapFill => "Gap fill",
             Self::SkirtBrim => "Skirt/Brim",
+            Self::SupportMaterial => "Support material",
+            Self::SupportInterface => "Support material interface",
             Self::Custom => "Custom",
         }
+    }
+
+    /// Returns whether it is a wall, whatever it rests on.
+    #[must_use]
+    pub fn is_wall(self) -> bool {
+        matches!(self, Self::ExternalPerimeter | Self::Perimeter | Self::OverhangPerimeter)
     }
 
     /// Returns the role with this label.

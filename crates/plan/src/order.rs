@@ -229,7 +229,7 @@ fn begun_at(path: &Toolpath, begin: Begin) -> OrderedLine {
     } else {
         stations.extend(all[after..].iter().chain(&all[..=after]));
     }
-    stations.dedup_by(|a, b| a.at == b.at && a.bead == b.bead);
+    stations.dedup_by(|a, b| a.at == b.at && a.bead == b.bead && a.overhang == b.overhang);
     OrderedLine { role: path.role, stations, island: None }
 }
 
@@ -242,6 +242,7 @@ fn between(a: &Station, b: &Station, share: f64) -> Station {
             width: blend(a.bead.width, b.bead.width),
             thickness: blend(a.bead.thickness, b.bead.thickness),
         },
+        overhang: a.overhang,
     }
 }
 
@@ -257,7 +258,9 @@ const SHORT_PIECE_TOLERANCE_MM: f64 = 0.005;
 fn leave_out_short(stations: &mut Vec<Station>, tolerance: f64) {
     let can_go = |before: &Station, station: &Station, after: &Station| {
         let (a, p, b) = (before.at.xy(), station.at.xy(), after.at.xy());
-        distance_to_segment(&a, &b, &p) < tolerance && before.bead == station.bead
+        distance_to_segment(&a, &b, &p) < tolerance
+            && before.bead == station.bead
+            && before.overhang == station.overhang
     };
     let mut kept: Vec<Station> = Vec::with_capacity(stations.len());
     for (i, station) in stations.iter().enumerate() {
@@ -380,13 +383,18 @@ fn improve(tour: &mut [Stop], ends: &[[Point2<f64>; 2]], start: Point2<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use slicer::toolpath::Overhang;
 
     const BEAD: Bead = Bead { width: 0.45, thickness: 0.2 };
 
     fn line(points: &[[f64; 2]], role: Role, closed: bool) -> Toolpath {
         let stations = points
             .iter()
-            .map(|p| Station { at: Point3::new(p[0], p[1], 0.2), bead: BEAD })
+            .map(|p| Station {
+                at: Point3::new(p[0], p[1], 0.2),
+                bead: BEAD,
+                overhang: Overhang::None,
+            })
             .collect();
         Toolpath { role, closed, stations }
     }

@@ -44,6 +44,8 @@ pub struct HeatParams {
     pub temperature: f64,
     /// Part fan, 0 to 1.
     pub fan: f64,
+    /// The same for bridges and overhangs, where that is more.
+    pub bridge_fan: f64,
     /// Layers without fan at the bottom.
     pub layers_without_fan: usize,
 }
@@ -143,6 +145,7 @@ impl<'a> Planner<'a> {
         let nozzle = self.begin_at();
         let lines = order(layer, nozzle, &mut self.seams, &self.params.order);
         let items = self.router.layer(layer, &lines, &self.params.speeds, &self.params.filament);
+        let items = self.with_bridge_fan(items, layer.index);
         let mut steps = self.heat(layer.index);
         let planned =
             self.lower(items).map_err(|source| PlanError { layer: layer.index, source })?;
@@ -194,6 +197,31 @@ impl<'a> Planner<'a> {
             steps.push(Step::Fan(heat.fan));
         }
         steps
+    }
+
+    /// Turns the fan up for what hangs in the air.
+    fn with_bridge_fan(&self, items: Vec<Item>, index: usize) -> Vec<Item> {
+        let heat = &self.params.heat;
+        if heat.bridge_fan <= heat.fan || index < heat.layers_without_fan {
+            return items;
+        }
+        let mut fan = heat.fan;
+        let mut all = Vec::with_capacity(items.len());
+        for item in items {
+            if let Item::Step(Step::Bead(role, _)) = &item {
+                let hangs = matches!(role, Role::BridgeInfill | Role::OverhangPerimeter);
+                let wanted = if hangs { heat.bridge_fan } else { heat.fan };
+                if wanted != fan {
+                    all.push(Item::Step(Step::Fan(wanted)));
+                    fan = wanted;
+                }
+            }
+            all.push(item);
+        }
+        if fan != heat.fan {
+            all.push(Item::Step(Step::Fan(heat.fan)));
+        }
+        all
     }
 
     /// Turns strokes into timed moves, in their places between the other steps.

@@ -7,7 +7,7 @@ use geom::region::Region;
 use machine::program::{self, Layer, Step};
 use nalgebra::{Point3, distance};
 use slicer::bead::Bead;
-use slicer::toolpath::{LayerPaths, Role, Station};
+use slicer::toolpath::{LayerPaths, Overhang, Role, Station};
 
 use crate::comb::Comb;
 use crate::order::OrderedLine;
@@ -28,6 +28,14 @@ pub struct Speeds {
     pub top_solid_infill: f64,
     /// Single beads.
     pub gap_fill: f64,
+    /// Infill that spans a gap.
+    pub bridge: f64,
+    /// Walls that hang over, by the degree from a quarter of the bead on; 0 for no bound.
+    pub overhang: [f64; 4],
+    /// The second run over tops.
+    pub ironing: f64,
+    /// Supports, and the layers of them next to the part.
+    pub support: [f64; 2],
     /// Everything on the first layer.
     pub first_layer: f64,
     /// Without extruding.
@@ -42,10 +50,21 @@ impl Speeds {
             Role::InternalInfill => self.infill,
             Role::SolidInfill => self.solid_infill,
             Role::TopSolidInfill => self.top_solid_infill,
+            Role::BridgeInfill => self.bridge,
+            Role::Ironing => self.ironing,
             Role::GapFill => self.gap_fill,
+            Role::SupportMaterial => self.support[0],
+            Role::SupportInterface => self.support[1],
             Role::SkirtBrim => self.first_layer,
         };
         if is_first_layer { speed.min(self.first_layer) } else { speed }
+    }
+
+    /// The speed of a piece of a wall that hangs over.
+    fn hanging(&self, speed: f64, overhang: Overhang) -> f64 {
+        let degree = Overhang::ALL.iter().position(|degree| *degree == overhang);
+        let bound = degree.and_then(|k| k.checked_sub(1)).map_or(0.0, |k| self.overhang[k]);
+        if bound > 0.0 { speed.min(bound) } else { speed }
     }
 }
 
@@ -340,18 +359,21 @@ impl Router {
         filament: &FilamentParams,
     ) {
         let wanted = speeds.of(line.role, is_first_layer);
-        let mut told_area = f64::NAN;
+        let mut told = (f64::NAN, None);
         for pair in line.stations.windows(2).flat_map(|pair| in_even_pieces(&pair[0], &pair[1])) {
             let (width, area) = if line.role == Role::ExternalPerimeter {
                 within(&pair[0], &pair[1])
             } else {
                 mean(&pair[0], &pair[1])
             };
-            let drift = (area - told_area).abs();
-            if drift.is_nan() || drift > AREA_DRIFT * told_area {
-                self.items.push(Item::Step(Step::Bead(program_role(line.role), width)));
-                told_area = area;
+            let overhang = if line.role.is_wall() { pair[0].overhang } else { Overhang::None };
+            let role = program_role(line.role, overhang);
+            let drift = (area - told.0).abs();
+            if drift.is_nan() || drift > AREA_DRIFT * told.0 || Some(role) != told.1 {
+                self.items.push(Item::Step(Step::Bead(role, width)));
+                told = (area, Some(role));
             }
+            let wanted = speeds.hanging(wanted, overhang);
             let length = (pair[1].at - pair[0].at).norm();
             let fed = area * length / filament.area * filament.multiplier;
             let melts = filament.volume_per_second / (area * filament.multiplier);
@@ -380,6 +402,7 @@ fn in_even_pieces(a: &Station, b: &Station) -> Vec<[Station; 2]> {
                 width: blend(a.bead.width, b.bead.width),
                 thickness: blend(a.bead.thickness, b.bead.thickness),
             },
+            overhang: a.overhang,
         }
     };
     (0..steps as u32)
@@ -414,13 +437,20 @@ fn within(a: &Station, b: &Station) -> (f64, f64) {
     (most, area - thickness * (width - most))
 }
 
-fn program_role(role: Role) -> program::Role {
+fn program_role(role: Role, overhang: Overhang) -> program::Role {
     match role {
+        Role::ExternalPerimeter | Role::Perimeter if overhang >= Overhang::Half => {
+            program::Role::OverhangPerimeter
+        }
         Role::ExternalPerimeter => program::Role::ExternalPerimeter,
         Role::Perimeter => program::Role::Perimeter,
         Role::InternalInfill => program::Role::InternalInfill,
         Role::SolidInfill => program::Role::SolidInfill,
         Role::TopSolidInfill => program::Role::TopSolidInfill,
+        Role::BridgeInfill => program::Role::BridgeInfill,
+        Role::Ironing => program::Role::Ironing,
+        Role::SupportMaterial => program::Role::SupportMaterial,
+        Role::SupportInterface => program::Role::SupportInterface,
         Role::GapFill => program::Role::GapFill,
         Role::SkirtBrim => program::Role::SkirtBrim,
     }
@@ -442,6 +472,10 @@ mod tests {
         solid_infill: 50.0,
         top_solid_infill: 30.0,
         gap_fill: 20.0,
+        bridge: 25.0,
+        overhang: [0.0, 25.0, 15.0, 10.0],
+        ironing: 15.0,
+        support: [50.0, 40.0],
         first_layer: 20.0,
         travel: 120.0,
     };
@@ -464,7 +498,11 @@ mod tests {
             role: Role::Perimeter,
             stations: points
                 .iter()
-                .map(|p| Station { at: Point3::new(p[0], p[1], z), bead: BEAD })
+                .map(|p| Station {
+                    at: Point3::new(p[0], p[1], z),
+                    bead: BEAD,
+                    overhang: Overhang::None,
+                })
                 .collect(),
             island: Some(0),
         }

@@ -31,6 +31,12 @@ impl Bead {
         self.width - self.thickness * ROUNDING
     }
 
+    /// Returns the bead of the same thickness with `flow` times the cross-section.
+    #[must_use]
+    pub fn with_flow(&self, flow: f64) -> Self {
+        Self::with_spacing(flow * self.spacing(), self.thickness)
+    }
+
     /// Returns the area of the cross-section, mm².
     #[must_use]
     pub fn area(&self) -> f64 {

@@ -7,13 +7,15 @@ use rayon::prelude::*;
 
 use crate::adhesion::{AdhesionParams, around};
 use crate::bead::Bead;
+use crate::bridge::bridges;
 use crate::chart::Chart;
-use crate::infill::{FillLayer, FillLine, InfillParams, fill};
+use crate::hanging::Below;
+use crate::infill::{FillLayer, FillLine, InfillParams, fill, fill_bridge};
 use crate::lift::Lift;
 use crate::skins::{Neighbours, SKIN_TOLERANCE_MM, SkinParams, skins};
 use crate::thin::{AxisPoint, ThinParams, axes};
 use crate::toolpath::{IslandPaths, LayerPaths, LostArea, Role, Toolpath, WallGroup};
-use crate::walls::{ThinPlace, WallParams, split_thin, walls};
+use crate::walls::{ThinPlace, WallParams, Walls, split_thin, walls};
 
 /// How layers are filled.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -147,7 +149,9 @@ fn fill_island(
 ) -> (IslandPaths, LostArea) {
     let outline = Region::from_island(island.clone());
     let Frame { chart, thickness, .. } = *frame;
-    let walls = walls(&outline, &chart, thickness, &params.walls);
+    let below = neighbours.below.first().copied().filter(|_| frame.lift.level.index > 0);
+    let hanging = Below::new(&outline, below, &chart, params.walls.external_width);
+    let walls = suitable_walls(&outline, &hanging, neighbours, frame, params);
     let solid_bead = Bead { width: params.infill.solid_width, thickness };
     let split = split_thin(&walls.interior, &chart, solid_bead.spacing() / 2.0);
     let index = frame.lift.level.index;
@@ -160,8 +164,16 @@ fn fill_island(
         tolerance: params.tolerance,
     };
     let interior = split.thick.thinned(SKIN_TOLERANCE_MM);
-    let skins = skins(&interior, &chart, neighbours, solid_bead.spacing(), &params.skins);
-    let filling = fill(&skins, &layer, &params.infill);
+    let spacing = solid_bead.spacing();
+    let mut skins = skins(&interior, &chart, neighbours, spacing, &params.skins);
+    let bridges = match below {
+        Some(below) => bridges(&mut skins, below, &chart, spacing),
+        None => Vec::new(),
+    };
+    let mut filling = fill(&skins, &layer, &params.infill);
+    for bridge in &bridges {
+        fill_bridge(bridge, &layer, &params.infill, &mut filling);
+    }
 
     let mut thin = walls.thin;
     let gaps = std::iter::once(split.thin).chain(filling.thin).filter(|gap| !gap.is_empty());
@@ -174,7 +186,12 @@ fn fill_island(
     let groups = walls.groups.iter().map(|group| {
         let loops = group.iter().map(|wall| {
             let role = if wall.depth == 0 { Role::ExternalPerimeter } else { Role::Perimeter };
-            Toolpath { role, closed: true, stations: frame.lift.stations(&wall.points, true) }
+            let stations = if hanging.is_open() {
+                frame.lift.hanging_stations(&hanging.along(&wall.points))
+            } else {
+                frame.lift.stations(&wall.points, true)
+            };
+            Toolpath { role, closed: true, stations }
         });
         WallGroup { loops: loops.collect() }
     });
@@ -189,6 +206,46 @@ fn fill_island(
     };
     (paths, lost)
 }
+
+/// The walls of an island: as many as are wanted, or one on top, or more where they hang over.
+fn suitable_walls(
+    outline: &Region,
+    hanging: &Below,
+    neighbours: &Neighbours<'_>,
+    frame: &Frame<'_>,
+    params: &PathParams,
+) -> Walls {
+    let mut wanted = params.walls;
+    let is_topmost = || match neighbours.above.first() {
+        Some(above) => outline.intersection(above).is_empty(),
+        None => true,
+    };
+    if wanted.one_on_top && wanted.count > 1 && is_topmost() {
+        wanted.count = 1;
+    }
+    let mut found = walls(outline, &frame.chart, frame.thickness, &wanted);
+    let below = neighbours.below.first().filter(|_| wanted.more_on_overhangs && hanging.is_open());
+    let Some(below) = below else { return found };
+    let spacing = Bead { width: wanted.width, thickness: frame.thickness }.spacing();
+    for _ in 0..MOST_EXTRA_WALLS {
+        let inner = frame.chart.inset(&found.interior, spacing);
+        let next = found.interior.difference(&inner);
+        let bare = next.difference(below).area();
+        if next.is_empty() || bare < EXTRA_WALL_SHARE * next.area() {
+            break;
+        }
+        wanted.count += 1;
+        found = walls(outline, &frame.chart, frame.thickness, &wanted);
+    }
+    found
+}
+
+/// Walls that a steep overhang gets beyond those that are wanted, at most: together they reach
+/// further than any slope that prints without support.
+const MOST_EXTRA_WALLS: usize = 4;
+
+/// One more wall is worth it where so much of its place has nothing below it.
+const EXTRA_WALL_SHARE: f64 = 0.3;
 
 fn single_beads(
     place: &ThinPlace,

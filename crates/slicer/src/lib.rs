@@ -11,8 +11,10 @@
 
 pub mod adhesion;
 pub mod bead;
+pub mod bridge;
 pub mod chart;
 pub mod clearance;
+pub(crate) mod hanging;
 pub mod infill;
 pub mod layer;
 pub mod level;

@@ -13,7 +13,7 @@ use crate::bead::Bead;
 use crate::level::Level;
 use crate::stacking::{Side, Stair, WedgeRule};
 use crate::surface::LayerSurface;
-use crate::toolpath::Station;
+use crate::toolpath::{Overhang, Station};
 
 /// How far the straight pieces of a toolpath may leave their layer, mm. With the machine's own chord
 /// tolerance on top, beads stay within 10 µm of their surface.
@@ -115,6 +115,22 @@ impl Lift<'_> {
         stations
     }
 
+    /// Returns the stations of a closed line whose pieces hang over by known degrees.
+    #[must_use]
+    pub fn hanging_stations(&self, line: &[(Point2<f64>, Bead, Overhang)]) -> Vec<Station> {
+        let mut stations = Vec::with_capacity(line.len());
+        for (k, (at, bead, overhang)) in line.iter().enumerate() {
+            let (to, to_bead, _) = line[(k + 1) % line.len()];
+            let first = stations.len();
+            stations.push(self.station(at, *bead));
+            self.between(&(*at, *bead), &(to, to_bead), &mut stations);
+            for station in &mut stations[first..] {
+                station.overhang = *overhang;
+            }
+        }
+        stations
+    }
+
     /// Whether lines stay straight and beads as thick as the layer.
     fn is_even(&self) -> bool {
         let is_plain = self.floor.is_none() && self.stair.is_none() && self.below.is_none();
@@ -122,15 +138,16 @@ impl Lift<'_> {
     }
 
     fn station(&self, uv: &Point2<f64>, bead: Bead) -> Station {
+        let overhang = Overhang::None;
         let at = self.point(uv);
         if self.is_even() {
-            return Station { at, bead };
+            return Station { at, bead, overhang };
         }
         let thickness = self.thickness(&at);
         if thickness == bead.thickness {
-            return Station { at, bead };
+            return Station { at, bead, overhang };
         }
-        Station { at, bead: Bead::with_spacing(bead.spacing(), thickness) }
+        Station { at, bead: Bead::with_spacing(bead.spacing(), thickness), overhang }
     }
 
     /// Appends the stations strictly between two points of the chart.

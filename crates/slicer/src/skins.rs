@@ -8,6 +8,7 @@
 
 use geom::region::Region;
 
+use crate::bridge::unsupported;
 use crate::chart::Chart;
 
 /// How many layers close the part, and when a small place is not worth leaving sparse.
@@ -32,6 +33,8 @@ pub struct Skins {
     pub solid: Region,
     /// The rest.
     pub sparse: Region,
+    /// Where nothing is below, whatever of the above that place is.
+    pub unsupported: Region,
 }
 
 /// The layers next to one, as far as its skins depend on them. The nearest comes first; a missing
@@ -68,6 +71,10 @@ pub fn skins(
     if interior.is_empty() {
         return Skins::default();
     }
+    let unsupported = match neighbours.below.first() {
+        Some(below) if params.bottom_layers > 0 => unsupported(interior, below, chart, spacing),
+        _ => Region::default(),
+    };
     let above = Cover::new(interior, chart, &neighbours.above, params.top_layers, spacing);
     let sparse = if params.all_solid || !above.is_complete {
         Region::default()
@@ -92,9 +99,10 @@ pub fn skins(
         (solid, sparse)
     };
     if above.open.is_empty() || params.top_layers == 0 {
-        return Skins { top: Region::default(), solid, sparse };
+        return Skins { top: Region::default(), solid, sparse, unsupported };
     }
-    Skins { top: solid.intersection(&above.open), solid: solid.difference(&above.open), sparse }
+    let top = solid.intersection(&above.open);
+    Skins { top, solid: solid.difference(&above.open), sparse, unsupported }
 }
 
 /// How the layers on one side cover an interior.

@@ -18,10 +18,47 @@ pub enum Role {
     SolidInfill,
     /// Solid infill that is seen from above.
     TopSolidInfill,
+    /// Solid infill that spans a gap.
+    BridgeInfill,
+    /// A second, thin run over what is seen from above.
+    Ironing,
     /// A bead between walls, of the width that is left there.
     GapFill,
     /// Skirt or brim.
     SkirtBrim,
+    /// What carries overhangs and is broken away.
+    SupportMaterial,
+    /// The layers of it next to the part.
+    SupportInterface,
+}
+
+impl Role {
+    /// Returns whether it is a wall.
+    #[must_use]
+    pub fn is_wall(self) -> bool {
+        matches!(self, Self::ExternalPerimeter | Self::Perimeter)
+    }
+}
+
+/// How much of a wall's bead the layer below does not carry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Overhang {
+    /// Less than a quarter of its width.
+    #[default]
+    None,
+    /// A quarter to a half.
+    Quarter,
+    /// A half to three quarters.
+    Half,
+    /// More than that.
+    Most,
+    /// All of it.
+    Whole,
+}
+
+impl Overhang {
+    /// All degrees, the least first.
+    pub const ALL: [Self; 5] = [Self::None, Self::Quarter, Self::Half, Self::Most, Self::Whole];
 }
 
 /// A point of a line and the bead there.
@@ -31,6 +68,8 @@ pub struct Station {
     pub at: Point3<f64>,
     /// The bead.
     pub bead: Bead,
+    /// How the piece up to the next station hangs over.
+    pub overhang: Overhang,
 }
 
 /// A line of material. Between stations the line is straight and the bead changes evenly.

@@ -31,6 +31,10 @@ pub struct WallParams {
     pub external_width: f64,
     /// Width of the others, mm.
     pub width: f64,
+    /// Whether islands with nothing above have a single wall.
+    pub one_on_top: bool,
+    /// Whether steep overhangs have more walls, so that infill does not begin in mid-air.
+    pub more_on_overhangs: bool,
 }
 
 /// A closed centreline in the chart, with the bead around it.
@@ -304,7 +308,13 @@ mod tests {
     use super::*;
     use geom::region::Fill;
 
-    const PARAMS: WallParams = WallParams { count: 2, external_width: 0.45, width: 0.45 };
+    const PARAMS: WallParams = WallParams {
+        count: 2,
+        external_width: 0.45,
+        width: 0.45,
+        one_on_top: false,
+        more_on_overhangs: false,
+    };
 
     fn polygon(points: &[[f64; 2]]) -> Region {
         let ring: Vec<Point2<f64>> = points.iter().map(|&p| Point2::from(p)).collect();

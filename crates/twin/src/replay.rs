@@ -369,14 +369,9 @@ fn heating(command: &Command<'_>, waiting: u32) -> Option<Heating> {
     Some(Heating { target, waits: command.is(b'M', waiting) })
 }
 
-/// The role with this label. Labels that other programs write, and the machine crate does not
-/// know, count as what they are nearest to; support counts as no part of the part.
+/// The role with this label; what the machine crate does not know is no part of the part.
 fn role_of(label: &str) -> Role {
-    Role::from_label(label).unwrap_or(match label {
-        "Overhang perimeter" => Role::Perimeter,
-        "Bridge infill" => Role::SolidInfill,
-        _ => Role::Custom,
-    })
+    Role::from_label(label).unwrap_or(Role::Custom)
 }
 
 fn number(text: &str) -> Option<f64> {

@@ -150,19 +150,18 @@ fn role(label: &str) -> Role {
     }
     let label = label.to_ascii_lowercase();
     match label.as_str() {
-        "outer wall" | "wall-outer" | "overhang perimeter" | "overhang wall" => {
-            Role::ExternalPerimeter
-        }
+        "outer wall" | "wall-outer" => Role::ExternalPerimeter,
+        "overhang perimeter" | "overhang wall" => Role::OverhangPerimeter,
         "inner wall" | "wall-inner" => Role::Perimeter,
         "fill" | "sparse infill" => Role::InternalInfill,
         "skin"
         | "internal solid infill"
-        | "bridge infill"
-        | "bridge"
         | "internal bridge"
         | "bottom surface"
         | "internal bridge infill" => Role::SolidInfill,
-        "top surface" | "ironing" => Role::TopSolidInfill,
+        "bridge infill" | "bridge" => Role::BridgeInfill,
+        "top surface" => Role::TopSolidInfill,
+        "ironing" => Role::Ironing,
         "gap infill" => Role::GapFill,
         "skirt" | "brim" => Role::SkirtBrim,
         _ => Role::Custom,
@@ -198,7 +197,7 @@ mod tests {
         );
         assert_eq!(
             (prusa[1].layer, prusa[1].role, prusa[1].width),
-            (Some(0), Role::SolidInfill, 0.5)
+            (Some(0), Role::BridgeInfill, 0.5)
         );
         assert_eq!(prusa[2].layer, Some(1));
         let bambu =

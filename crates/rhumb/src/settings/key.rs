@@ -680,6 +680,12 @@ pub const KEYS: &[Key] = &[
         "how far the nozzle runs back along the line while the filament is drawn back",
     ),
     share(Material, "fan_speed", 1.0, "part fan"),
+    share(
+        Material,
+        "bridge_fan_speed",
+        1.0,
+        "part fan for bridges and overhanging walls, where that is more",
+    ),
     count(Material, "disable_fan_first_layers", (1, 0, 1000), "layers at the bottom without fan"),
     number(
         Material,
@@ -814,6 +820,23 @@ pub const KEYS: &[Key] = &[
         program_name: "avoid_crossing_perimeters",
         meaning: "whether travel inside an island goes round its holes and notches, with the filament ready, \
                   instead of across them; on flat layers",
+    },
+    Key {
+        name: "only_one_perimeter_top",
+        section: Print,
+        kind: Kind::Switch,
+        default: Default::Switch(false),
+        program_name: "only_one_perimeter_top",
+        meaning: "whether islands with nothing above have a single wall, and more of the top pattern",
+    },
+    Key {
+        name: "extra_perimeters",
+        section: Print,
+        kind: Kind::Switch,
+        default: Default::Switch(false),
+        program_name: "extra_perimeters",
+        meaning: "whether steep overhangs get up to four more walls, so that no infill begins in \
+                  mid-air",
     },
     choice(
         Print,
@@ -997,6 +1020,48 @@ pub const KEYS: &[Key] = &[
         "gap_fill_speed",
         (25.0, 0.1, 1000.0),
         "speed of single beads",
+    ),
+    number(
+        Print,
+        "bridge_speed_mm_per_s",
+        "bridge_speed",
+        (30.0, 0.1, 1000.0),
+        "speed of infill that spans a gap",
+    ),
+    number(
+        Print,
+        "bridge_flow_ratio",
+        "bridge_flow_ratio",
+        (1.0, 0.3, 2.0),
+        "material of bridges by what their place holds",
+    ),
+    number(
+        Print,
+        "overhang_speed_0_mm_per_s",
+        "overhang_speed_0",
+        (15.0, 0.0, 1000.0),
+        "greatest speed of walls that the layer below does not carry at all; 0 for no bound",
+    ),
+    number(
+        Print,
+        "overhang_speed_1_mm_per_s",
+        "overhang_speed_1",
+        (20.0, 0.0, 1000.0),
+        "greatest speed of walls carried by up to a quarter of their width; 0 for no bound",
+    ),
+    number(
+        Print,
+        "overhang_speed_2_mm_per_s",
+        "overhang_speed_2",
+        (25.0, 0.0, 1000.0),
+        "greatest speed of walls carried by a quarter to a half of their width; 0 for no bound",
+    ),
+    number(
+        Print,
+        "overhang_speed_3_mm_per_s",
+        "overhang_speed_3",
+        (0.0, 0.0, 1000.0),
+        "greatest speed of walls carried by a half to three quarters of their width; 0 for no bound",
     ),
     number(
         Print,

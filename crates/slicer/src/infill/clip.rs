@@ -33,7 +33,7 @@ pub(super) fn clipped(area: &Region, courses: &[Course]) -> Clipped {
     let mut clipped = Clipped::default();
     let Some(sides) = Sides::of(area) else { return clipped };
     for course in courses {
-        let mut crossings = sides.crossings(course);
+        let mut crossings = sides.crossings(&course.points, course.closed);
         if crossings.is_empty() {
             let is_inside = || course.points.first().is_some_and(|p| area.contains(p));
             if course.closed && is_inside() {
@@ -71,14 +71,16 @@ fn chord(course: &Course, from: &Crossing, to: &Crossing) -> Chord {
 
 /// A place where a line crosses a ring.
 #[derive(Debug, Clone, Copy)]
-struct Crossing {
+pub(crate) struct Crossing {
     /// The piece of the line: piece `i` begins at point `i`.
-    piece: usize,
+    pub(crate) piece: usize,
     /// Share of the piece before it.
-    along: f64,
-    at: Point2<f64>,
+    pub(crate) along: f64,
+    /// The place, mm.
+    pub(crate) at: Point2<f64>,
     rim: RimPoint,
-    enters: bool,
+    /// Whether the line comes in there, and does not go out.
+    pub(crate) enters: bool,
 }
 
 /// A side of a ring.
@@ -89,7 +91,7 @@ struct Side {
 }
 
 /// The sides of an area, by the cells that they run through.
-struct Sides {
+pub(crate) struct Sides {
     sides: Vec<Side>,
     cells: Vec<Vec<u32>>,
     low: Point2<f64>,
@@ -106,7 +108,7 @@ const MOST_CELLS: f64 = 256.0;
 
 impl Sides {
     /// `None` where there are none.
-    fn of(area: &Region) -> Option<Self> {
+    pub(crate) fn of(area: &Region) -> Option<Self> {
         let bounds = area.bounds()?;
         let (low, high) = (mm(bounds.min), mm(bounds.max));
         let extent = high - low;
@@ -171,14 +173,18 @@ impl Sides {
         }
     }
 
-    /// All crossings of a line with the rings, in its order.
-    fn crossings(&self, course: &Course) -> Vec<Crossing> {
-        let count = course.points.len();
-        let pieces = if course.closed { count } else { count.saturating_sub(1) };
+    /// All crossings of a closed line with the rings, in its order.
+    pub(crate) fn crossings_of_ring(&self, points: &[Point2<f64>]) -> Vec<Crossing> {
+        self.crossings(points, true)
+    }
+
+    fn crossings(&self, points: &[Point2<f64>], closed: bool) -> Vec<Crossing> {
+        let count = points.len();
+        let pieces = if closed { count } else { count.saturating_sub(1) };
         let mut crossings = Vec::new();
         let mut near: Vec<u32> = Vec::new();
         for piece in 0..pieces {
-            let ends = [course.points[piece], course.points[(piece + 1) % count]];
+            let ends = [points[piece], points[(piece + 1) % count]];
             near.clear();
             self.on_the_way(&ends, |cell| near.extend(&self.cells[cell]));
             near.sort_unstable();

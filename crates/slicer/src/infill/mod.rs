@@ -8,7 +8,7 @@
 //! then take exactly the area's volume: a line that ends at the rim leaves half a spacing at either
 //! end, and each join along the rim makes up for two of those halves.
 
-mod clip;
+pub(crate) mod clip;
 mod concentric;
 mod field;
 mod honeycomb;
@@ -25,6 +25,7 @@ use nalgebra::Point2;
 
 use self::link::JoinParams;
 use crate::bead::Bead;
+use crate::bridge::Bridge;
 use crate::chart::Chart;
 use crate::skins::Skins;
 use crate::surface::LayerSurface;
@@ -103,6 +104,8 @@ pub struct InfillParams {
     pub top_width: f64,
     /// The longest piece of rim that joins two lines of a sparse area, mm.
     pub longest_join: f64,
+    /// Material of a bridge by what its place holds.
+    pub bridge_flow: f64,
 }
 
 /// A line of infill in the chart.
@@ -199,6 +202,50 @@ pub fn fill(skins: &Skins, layer: &FillLayer<'_>, params: &InfillParams) -> Fill
         filling.lines.extend(sparse::fill(&skins.sparse, layer, params));
     }
     filling
+}
+
+/// Returns parallel lines across an area, `spacing` mm apart, from rim to rim.
+pub(crate) fn straight_lines(
+    area: &Region,
+    spacing: f64,
+    angle: f64,
+) -> impl Iterator<Item = [Point2<f64>; 2]> {
+    rectilinear::rows_at(area, spacing / 2.0, spacing, angle)
+        .into_iter()
+        .filter_map(|chord| Some([*chord.points.first()?, *chord.points.last()?]))
+}
+
+/// Fills a bridge with straight lines, beads with `flow` times the volume of their place.
+pub(crate) fn fill_bridge(
+    bridge: &Bridge,
+    layer: &FillLayer<'_>,
+    params: &InfillParams,
+    filling: &mut Filling,
+) {
+    let bead = Bead { width: params.solid_width, thickness: layer.thickness };
+    for island in bridge.area.islands() {
+        let area = Region::from_island(island.clone());
+        let seen = layer.chart.region_from_above(&area);
+        let even = rectilinear::evenly(&seen, bead.spacing(), bridge.angle);
+        let role = Role::BridgeInfill;
+        let mut lines = open_lines(&even.core, &even.chords, &SOLID_JOINS, role, bead, layer);
+        for line in &mut lines {
+            line.points = sparse::under(&line.points, layer);
+        }
+        let length: f64 = lines
+            .iter()
+            .flat_map(|line| line.points.windows(2))
+            .map(|w| layer.chart.length(&w[0], &w[1]))
+            .sum();
+        // On a slope lines lie farther apart than they look.
+        let spacing = if layer.chart.is_flat() {
+            even.spacing
+        } else {
+            (layer.chart.area(&area) / length).clamp(0.5 * even.spacing, 2.0 * even.spacing)
+        };
+        let bead = Bead::with_spacing(spacing, layer.thickness).with_flow(params.bridge_flow);
+        filling.lines.extend(lines.into_iter().map(|line| FillLine { bead, ..line }));
+    }
 }
 
 /// The direction of parallel lines in a layer.
@@ -346,6 +393,7 @@ mod tests {
         solid_width: 0.45,
         top_width: 0.45,
         longest_join: 10.0,
+        bridge_flow: 1.0,
     };
 
     const PATTERNS: [Pattern; 10] = [

@@ -165,7 +165,7 @@ impl Sparse<'_> {
             let mut points = points.clone();
             points.extend(points.first().copied());
             let mut points =
-                self.under(&geom::simplify::simplify_line(&points, CURVE_TOLERANCE_MM));
+                under(&geom::simplify::simplify_line(&points, CURVE_TOLERANCE_MM), self.layer);
             points.pop();
             points
         });
@@ -180,7 +180,7 @@ impl Sparse<'_> {
         let (joins, role) = (joins(self.params), Role::InternalInfill);
         let mut lines = open_lines(&self.area, chords, &joins, role, self.bead, &layer);
         for line in &mut lines {
-            line.points = self.under(&line.points);
+            line.points = under(&line.points, self.layer);
         }
         lines
     }
@@ -191,19 +191,19 @@ impl Sparse<'_> {
             _ => self.layer.tolerance,
         }
     }
+}
 
-    /// A line seen along the axis, in the chart, with points until it is followed to within the
-    /// tolerance.
-    fn under(&self, line: &[Point2<f64>]) -> Vec<Point2<f64>> {
-        let chart = &self.layer.chart;
-        let mut points: Vec<Point2<f64>> = line.iter().take(1).map(|p| chart.under(p)).collect();
-        for pair in line.windows(2) {
-            let ends = [chart.under(&pair[0]), chart.under(&pair[1])];
-            under_side([pair[0], pair[1]], ends, self.layer, &mut points);
-            points.push(ends[1]);
-        }
-        points
+/// A line seen along the axis, in the chart, with points until it is followed to within the
+/// tolerance.
+pub(super) fn under(line: &[Point2<f64>], layer: &FillLayer<'_>) -> Vec<Point2<f64>> {
+    let chart = &layer.chart;
+    let mut points: Vec<Point2<f64>> = line.iter().take(1).map(|p| chart.under(p)).collect();
+    for pair in line.windows(2) {
+        let ends = [chart.under(&pair[0]), chart.under(&pair[1])];
+        under_side([pair[0], pair[1]], ends, layer, &mut points);
+        points.push(ends[1]);
     }
+    points
 }
 
 /// Where the planes of `cubic` lie at the axis, in spacings: three of them would meet on it in a

@@ -74,7 +74,7 @@ impl Continuity {
     /// Judges whether a wall runs back over itself. Where the bed turns by much, the chord says little
     /// of a line's direction at its ends.
     fn back(&mut self, segment: &Segment, findings: &mut Findings) {
-        let is_wall = matches!(segment.role, Role::ExternalPerimeter | Role::Perimeter);
+        let is_wall = segment.role.is_wall();
         let is_straight = segment.bed_change().abs() < 0.1 && segment.nearest > NEAR_AXIS;
         let way = segment.part[1] - segment.part[0];
         let is_judged = is_wall && is_straight && segment.extrudes() && segment.path > SHORT;

@@ -1,6 +1,6 @@
 //! Does the outermost bead stay within the part?
 //!
-//! Halfway along external perimeters both sides of the bead are looked at: a point
+//! Halfway along external and overhanging perimeters both sides of the bead are looked at: a point
 //! [`STICK_OUT`] + [`SLACK`] inside either side must lie within the mesh, half a layer under the
 //! nozzle. On planar layers that is the mesh's section at the middle of the layer; on curved ones
 //! the points lie along the normal of the layer, the mesh's [columns](Columns) are asked, and how
@@ -111,7 +111,9 @@ impl Deposit {
     }
 
     pub(crate) fn segment(&mut self, segment: &Segment) {
-        if segment.role != Role::ExternalPerimeter || !segment.extrudes() || !self.is_sound {
+        // Walls that hang over are outer ones, or lie inside of one.
+        let is_outer = matches!(segment.role, Role::ExternalPerimeter | Role::OverhangPerimeter);
+        if !is_outer || !segment.extrudes() || !self.is_sound {
             return;
         }
         let [from, to] = &segment.part;

@@ -1,8 +1,8 @@
 //! Is as much material laid as the part holds, and no more?
 //!
 //! What a layer holds is the area of the mesh's section at the middle of the layer times its
-//! height; what is laid is filament times its cross-section. Skirt, brim, priming and supports
-//! (`Custom`) are not the part's.
+//! height; what is laid is filament times its cross-section. Skirt, brim, priming
+//! (`Custom`) and supports are not the part's.
 //!
 //! * A layer may hold more than its section by [`LAYER_SHARE`] of it, plus [`BORDER`] times its
 //!   outline, plus one bead's dot.
@@ -253,7 +253,7 @@ fn whole(laid: f64, bill: &Bill, is_solid: bool, place: Place, findings: &mut Fi
 }
 
 fn is_part(role: Role) -> bool {
-    !matches!(role, Role::SkirtBrim | Role::Custom)
+    !matches!(role, Role::SkirtBrim | Role::SupportMaterial | Role::SupportInterface | Role::Custom)
 }
 
 fn role_index(role: Role) -> usize {

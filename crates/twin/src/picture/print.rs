@@ -373,8 +373,7 @@ enum Look {
 
 impl Look {
     fn of(role: Role) -> Self {
-        let is_wall = matches!(role, Role::ExternalPerimeter | Role::Perimeter);
-        if is_wall { Self::Wall } else { Self::Fill }
+        if role.is_wall() { Self::Wall } else { Self::Fill }
     }
 
     /// The step of light or width of a piece, up to [`STEPS`].

@@ -1,0 +1,154 @@
+//! How far walls hang over the layer below.
+//!
+//! Of a bead that runs `d` mm outside of what is below, the share `½ + d/width` hangs over. Lines
+//! are cut where that share passes a quarter, a half, three quarters and one.
+
+use geom::region::Region;
+use nalgebra::Point2;
+
+use crate::bead::Bead;
+use crate::chart::Chart;
+use crate::infill::clip::Sides;
+use crate::toolpath::Overhang;
+
+/// A point of a line, its bead, and how the piece after it hangs over.
+pub(crate) type Hanging = (Point2<f64>, Bead, Overhang);
+
+/// What is below a layer, as beads of one width feel it.
+pub(crate) struct Below {
+    /// For each degree but the least: where beads hang over by less than that. Empty where no bead
+    /// of the island hangs over at all.
+    carries: Vec<(Overhang, Region)>,
+}
+
+/// How far outside of what is below a bead runs that hangs over by the degree, in widths.
+const FROM: [(Overhang, f64); 4] = [
+    (Overhang::Quarter, -0.25),
+    (Overhang::Half, 0.0),
+    (Overhang::Most, 0.25),
+    (Overhang::Whole, 0.5),
+];
+
+impl Below {
+    /// `outline` is the island whose walls are judged, `below` the layer that it lies on (`None` for
+    /// the bed), `width` that of the beads, mm.
+    pub(crate) fn new(outline: &Region, below: Option<&Region>, chart: &Chart, width: f64) -> Self {
+        let mut carries = Vec::new();
+        let Some(below) = below else { return Self { carries } };
+        // The outermost bead runs half a width inside the outline; within a quarter of a width
+        // nothing hangs over.
+        let hangs = |reach: f64| !outline.difference(&chart.outset(below, reach)).is_empty();
+        if outline.difference(below).is_empty() || !hangs(0.25 * width) {
+            return Self { carries };
+        }
+        for (degree, share) in FROM {
+            let region = if share < 0.0 {
+                chart.inset(below, -share * width)
+            } else if share > 0.0 {
+                chart.outset(below, share * width)
+            } else {
+                below.clone()
+            };
+            carries.push((degree, region));
+        }
+        Self { carries }
+    }
+
+    /// Returns whether anything can hang over.
+    pub(crate) fn is_open(&self) -> bool {
+        !self.carries.is_empty()
+    }
+
+    /// A closed line, cut where it comes to hang over by another degree.
+    pub(crate) fn along(&self, line: &[(Point2<f64>, Bead)]) -> Vec<Hanging> {
+        let mut cut: Vec<Hanging> =
+            line.iter().map(|(at, bead)| (*at, *bead, Overhang::None)).collect();
+        for (degree, region) in &self.carries {
+            cut = beyond(&cut, region, *degree);
+        }
+        cut
+    }
+}
+
+/// Raises the pieces of a closed line outside of a region to a degree.
+fn beyond(line: &[Hanging], region: &Region, degree: Overhang) -> Vec<Hanging> {
+    let points: Vec<Point2<f64>> = line.iter().map(|(at, ..)| *at).collect();
+    let Some(first) = points.first() else { return Vec::new() };
+    let mut inside = region.contains(first);
+    let crossings = match Sides::of(region) {
+        Some(sides) => sides.crossings_of_ring(&points),
+        None => Vec::new(),
+    };
+    let mut crossings = crossings.iter().peekable();
+    let mut cut = Vec::with_capacity(line.len());
+    for (piece, (at, bead, before)) in line.iter().enumerate() {
+        let degree_now = |inside: bool| if inside { *before } else { degree };
+        cut.push((*at, *bead, degree_now(inside)));
+        while let Some(crossing) = crossings.next_if(|crossing| crossing.piece == piece) {
+            inside = crossing.enters;
+            let next = line[(piece + 1) % line.len()].1;
+            let blend = |a: f64, b: f64| a + (b - a) * crossing.along;
+            let bead = Bead {
+                width: blend(bead.width, next.width),
+                thickness: blend(bead.thickness, next.thickness),
+            };
+            cut.push((crossing.at, bead, degree_now(inside)));
+        }
+    }
+    cut
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geom::region::Fill;
+
+    fn square(half: f64) -> Vec<Point2<f64>> {
+        [[-half, -half], [half, -half], [half, half], [-half, half]].map(Point2::from).to_vec()
+    }
+
+    fn region(half: f64) -> Region {
+        Region::from_rings([square(half).as_slice()], Fill::NonZero)
+    }
+
+    const BEAD: Bead = Bead { width: 0.4, thickness: 0.2 };
+
+    /// Length of the outermost wall of a square of 20 mm by degree, over a square.
+    fn lengths(below: f64) -> [f64; 5] {
+        let below = Below::new(&region(10.0), Some(&region(below)), &Chart::Plane, BEAD.width);
+        let line: Vec<(Point2<f64>, Bead)> = square(9.8).iter().map(|p| (*p, BEAD)).collect();
+        let cut = below.along(&line);
+        let mut lengths = [0.0; 5];
+        for (k, (at, _, degree)) in cut.iter().enumerate() {
+            let next = cut[(k + 1) % cut.len()].0;
+            let index = Overhang::ALL.iter().position(|d| d == degree).unwrap();
+            lengths[index] += (next - at).norm();
+        }
+        lengths
+    }
+
+    #[test]
+    fn a_wall_hangs_over_by_what_is_missing_below_it() {
+        for (below, index) in [(10.0, 0), (9.95, 0), (9.85, 1), (9.75, 2), (9.65, 3), (9.5, 4)] {
+            let lengths = lengths(below);
+            assert!((lengths[index] - 78.4).abs() < 0.5, "{below}: {lengths:?}");
+        }
+    }
+
+    #[test]
+    fn a_wall_is_cut_where_it_leaves_the_ground() {
+        let ring = [[-12.0, -12.0], [3.0, -12.0], [3.0, 12.0], [-12.0, 12.0]].map(Point2::from);
+        let ground = Region::from_rings([ring.as_slice()], Fill::NonZero);
+        let below = Below::new(&region(10.0), Some(&ground), &Chart::Plane, BEAD.width);
+        let line: Vec<(Point2<f64>, Bead)> = square(9.8).iter().map(|p| (*p, BEAD)).collect();
+        for (at, _, degree) in below.along(&line) {
+            let expected = match at.x {
+                x if x < 2.89 => Overhang::None,
+                // Going along +x on the lower side and back on the upper one.
+                x if x > 3.25 && at.y < 0.0 => Overhang::Whole,
+                _ => continue,
+            };
+            assert_eq!(degree, expected, "{at}");
+        }
+    }
+}

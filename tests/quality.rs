@@ -1,0 +1,155 @@
+//! What people look at in a print: bridges, overhangs, tops, infill.
+
+use mesh::mesh::Mesh;
+use mesh::shapes::extruded;
+use nalgebra::{Isometry3, Vector3};
+
+use crate::program::{Motion, beads, motions};
+use crate::run::Scratch;
+
+/// A profile in the upright plane through x, `depth` mm deep along y.
+fn upright(profile: &[[f64; 2]], depth: f64) -> Mesh {
+    let flat = extruded(profile, &[], depth);
+    let raised = Isometry3::rotation(Vector3::x() * std::f64::consts::FRAC_PI_2);
+    flat.transformed(&raised)
+}
+
+/// Two pillars and a beam over the gap of `gap` mm between them, 10 mm above the bed.
+fn portal(gap: f64) -> Mesh {
+    let (inner, outer) = (gap / 2.0, gap / 2.0 + 6.0);
+    let profile = [
+        [-outer, 0.0],
+        [-inner, 0.0],
+        [-inner, 10.0],
+        [inner, 10.0],
+        [inner, 0.0],
+        [outer, 0.0],
+        [outer, 13.0],
+        [-outer, 13.0],
+    ];
+    upright(&profile, 14.0)
+}
+
+fn sliced(mesh: &Mesh, more: &[&str]) -> String {
+    let scratch = Scratch::new();
+    scratch.file("m.stl", mesh::stl::write(mesh));
+    let mut all = vec!["slice", "m.stl", "-q", "-o", "-", "--orient", "keep"];
+    all.extend(more);
+    scratch.run(&all).expect(0).out
+}
+
+/// The piece of a motion in the part: its begin and its way.
+fn way(motion: &Motion<'_>) -> [f64; 2] {
+    let (from, to) = (motion.at(0.0), motion.at(1.0));
+    [to[0] - from[0], to[1] - from[1]]
+}
+
+#[test]
+fn a_bridge_spans_the_gap_from_pillar_to_pillar() {
+    for gap in [8.0, 15.0] {
+        // Wherever the part stands and however it is turned, lines go the short way over the gap.
+        for place in ["0,0", "40,10"] {
+            let text = sliced(&portal(gap), &["--place", place, "--set", "fill_angle_deg=30"]);
+            let all = motions(&text);
+            let bridges = beads(&all, "Bridge infill");
+            assert!(!bridges.is_empty(), "gap {gap}");
+            let (mut along, mut across) = (0.0, 0.0);
+            for motion in bridges.iter().flat_map(|bead| bead.iter()) {
+                let [x, y] = way(motion);
+                along += x.abs();
+                across += y.abs();
+                assert!((motion.to[2] - 10.2).abs() < 0.11, "only the first layer over the gap");
+                assert!(motion.speed <= 30.0 + 1e-6, "{} mm/s", motion.speed);
+            }
+            // Lines reach onto both pillars; at their ends the nozzle steps aside.
+            assert!(along > 12.0 * across, "gap {gap} at {place}: {along} {across}");
+            let lines = (along / (gap + 1.5)).round();
+            assert!((20.0..40.0).contains(&lines), "gap {gap}: {lines} lines");
+        }
+    }
+}
+
+#[test]
+fn the_fan_blows_at_bridges() {
+    let text = sliced(&portal(8.0), &["--set", "fan_speed=50%"]);
+    let lines: Vec<&str> = text.lines().collect();
+    let fan_before = |k: usize| lines[..k].iter().rev().find(|line| line.starts_with("M106"));
+    for (k, line) in lines.iter().enumerate() {
+        match *line {
+            ";TYPE:Bridge infill" => assert_eq!(fan_before(k), Some(&"M106 S255"), "line {k}"),
+            ";TYPE:Internal infill" => assert_eq!(fan_before(k), Some(&"M106 S128"), "line {k}"),
+            _ => {}
+        }
+    }
+    assert!(text.contains(";TYPE:Bridge infill"));
+}
+
+/// A block two of whose sides lean out by `aside` mm a layer.
+fn leaning(aside: f64) -> Mesh {
+    let (layers, height) = (40.0, 8.0);
+    let out = aside * layers;
+    let profile = [[-6.0, 0.0], [6.0, 0.0], [6.0 + out, height], [-6.0 - out, height]];
+    upright(&profile, 12.0)
+}
+
+#[test]
+fn walls_slow_down_by_what_hangs_over() {
+    // 0.05 mm of a bead of 0.45 mm, a third of it, two thirds, and all.
+    for (aside, wanted, is_overhang) in
+        [(0.05, 30.0, false), (0.16, 30.0, false), (0.28, 20.0, true), (0.5, 12.0, true)]
+    {
+        let speeds = ["overhang_speed_0_mm_per_s=12", "overhang_speed_1_mm_per_s=16"];
+        let speeds = speeds.iter().chain(&["overhang_speed_2_mm_per_s=20"]);
+        let mut arguments = vec!["--set", "slowdown_below_layer_time_s=0"];
+        for speed in speeds {
+            arguments.extend(["--set", speed]);
+        }
+        arguments.extend(["--set", "rail_acceleration_mm_per_s2=90000"]);
+        arguments.extend(["--set", "path_acceleration_mm_per_s2=90000"]);
+        arguments.extend(["--set", "bed_acceleration_deg_per_s2=900000"]);
+        arguments.extend(["--set", "bed_speed_deg_per_s=9000"]);
+        let text = sliced(&leaning(aside), &arguments);
+        let all = motions(&text);
+        // The outermost wall of one layer on the leaning side.
+        let outer = |m: &&Motion<'_>| {
+            let [from, to] = [m.at(0.0), m.at(1.0)];
+            let edge = 6.0 + aside * 20.0 - 0.225;
+            let is_there = |p: [f64; 3]| (p[0].abs() - edge).abs() < 0.06 + aside;
+            m.lays()
+                && (m.to[2] - 4.1).abs() < 0.11
+                && is_there(from)
+                && is_there(to)
+                && m.path() > 0.05
+                && m.role != "Solid infill"
+        };
+        let walls: Vec<&Motion<'_>> = all.iter().filter(outer).collect();
+        assert!(!walls.is_empty());
+        for wall in walls.iter().filter(|wall| wall.role != "Perimeter") {
+            assert_eq!(wall.role == "Overhang perimeter", is_overhang, "{aside}: {wall:?}");
+        }
+        let fastest = walls.iter().filter(|w| w.role != "Perimeter").map(|w| w.speed);
+        let fastest = fastest.fold(0.0, f64::max);
+        assert!((fastest - wanted).abs() < 0.5, "{aside} mm a layer: {fastest} mm/s");
+    }
+}
+
+#[test]
+fn a_single_wall_on_top_and_more_on_overhangs() {
+    let count = |text: &str, z: f64| {
+        let all = motions(text);
+        let walls = all.iter().filter(|m| (m.to[2] - z).abs() < 0.05 && m.lays());
+        let length =
+            |role: &str| walls.clone().filter(|m| m.role == role).map(Motion::path).sum::<f64>();
+        (length("External perimeter") + length("Overhang perimeter"), length("Perimeter"))
+    };
+    let cube = mesh::shapes::cube(12.0);
+    let text = sliced(&cube, &["--set", "only_one_perimeter_top=true"]);
+    assert_eq!(count(&text, 12.0).1, 0.0);
+    assert!(count(&text, 11.8).1 > 30.0);
+    // A funnel that widens by 1.2 mm a layer all around.
+    let steep = mesh::shapes::revolved(&[[0.0, 0.0], [6.0, 0.0], [18.0, 2.0], [0.0, 2.0]], 90);
+    let plain = count(&sliced(&steep, &[]), 1.2);
+    let more = count(&sliced(&steep, &["--set", "extra_perimeters=true"]), 1.2);
+    let sum = |(outer, inner): (f64, f64)| outer + inner;
+    assert!(sum(more) > 1.3 * sum(plain), "{plain:?} {more:?}");
+}
