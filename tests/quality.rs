@@ -33,9 +33,10 @@ fn portal(gap: f64) -> Mesh {
 fn sliced(mesh: &Mesh, more: &[&str]) -> String {
     let scratch = Scratch::new();
     scratch.file("m.stl", mesh::stl::write(mesh));
-    let mut all = vec!["slice", "m.stl", "-q", "-o", "-", "--orient", "keep"];
+    let mut all = vec!["slice", "m.stl", "-q", "-o", "x.gcode", "--orient", "keep"];
     all.extend(more);
-    scratch.run(&all).expect(0).out
+    scratch.run(&all).expect(0);
+    std::fs::read_to_string(scratch.path("x.gcode")).unwrap()
 }
 
 /// The piece of a motion in the part: its begin and its way.
@@ -120,6 +121,7 @@ fn walls_slow_down_by_what_hangs_over() {
                 && is_there(from)
                 && is_there(to)
                 && m.path() > 0.05
+                && (from[0] - to[0]).abs() < 0.1 * (from[1] - to[1]).abs()
                 && m.role != "Solid infill"
         };
         let walls: Vec<&Motion<'_>> = all.iter().filter(outer).collect();
@@ -152,4 +154,103 @@ fn a_single_wall_on_top_and_more_on_overhangs() {
     let more = count(&sliced(&steep, &["--set", "extra_perimeters=true"]), 1.2);
     let sum = |(outer, inner): (f64, f64)| outer + inner;
     assert!(sum(more) > 1.3 * sum(plain), "{plain:?} {more:?}");
+}
+
+/// Extent of what a role lays in x at a height: least and greatest, bead included.
+fn reach(text: &str, role: &str, z: f64) -> [f64; 2] {
+    let all = motions(text);
+    let there = all.iter().filter(|m| m.lays() && m.role == role && (m.to[2] - z).abs() < 0.05);
+    there.fold([f64::MAX, f64::MIN], |[low, high], m| {
+        let half = m.width / 2.0;
+        let ends = [m.at(0.0)[0], m.at(1.0)[0]];
+        let (a, b) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        [low.min(a - half), high.max(b + half)]
+    })
+}
+
+#[test]
+fn outlines_move_as_told() {
+    let cube = mesh::shapes::cube(12.0);
+    let width = |more: &[&str], z: f64| {
+        let text = sliced(&cube, more);
+        let [low, high] = reach(&text, "External perimeter", z);
+        high - low
+    };
+    let close = |a: f64, b: f64| assert!((a - b).abs() < 0.012, "{a} instead of {b}");
+    close(width(&[], 4.0), 12.0);
+    close(width(&["--set", "xy_size_compensation_mm=-0.1"], 4.0), 11.8);
+    close(width(&["--set", "xy_size_compensation_mm=0.1"], 4.0), 12.2);
+    close(width(&["--set", "elefant_foot_compensation_mm=0.15"], 0.2), 11.7);
+    close(width(&["--set", "elefant_foot_compensation_mm=0.15"], 0.4), 12.0);
+}
+
+#[test]
+fn ironing_runs_over_the_top_and_nothing_else() {
+    let text = sliced(&mesh::shapes::cube(12.0), &["--set", "ironing=true"]);
+    let all = motions(&text);
+    let ironing: Vec<&Motion<'_>> =
+        all.iter().filter(|m| m.lays() && m.role == "Ironing").collect();
+    assert!(ironing.iter().all(|m| (m.to[2] - 12.0).abs() < 1e-3));
+    // Lines 0.15 mm apart over the inside, a fifth of the material.
+    let length: f64 = ironing.iter().map(|m| m.path()).sum();
+    let volume: f64 = ironing.iter().map(|m| m.volume()).sum();
+    assert!((length * 0.15 / 100.0 - 1.0).abs() < 0.15, "{length} mm");
+    assert!((volume / length - 0.2 * 0.15 * 0.2).abs() < 0.001, "{}", volume / length);
+    // After the top itself.
+    let first = ironing[0].line;
+    let tops = all.iter().filter(|m| m.lays() && m.role == "Top solid infill");
+    assert!(tops.clone().count() > 0 && tops.clone().all(|m| m.line < first));
+}
+
+#[test]
+fn infill_first_and_rough_walls() {
+    let cube = mesh::shapes::cube(12.0);
+    let order = |text: &str| {
+        let all = motions(text);
+        let of = |role: &str| {
+            all.iter().find(|m| m.lays() && m.role == role && m.layer == Some(20)).unwrap().line
+        };
+        of("Internal infill") < of("External perimeter")
+    };
+    assert!(!order(&sliced(&cube, &[])));
+    assert!(order(&sliced(&cube, &["--set", "infill_first=true"])));
+    let text = sliced(&cube, &["--set", "fuzzy_skin=true"]);
+    let all = motions(&text);
+    let walls = all.iter().filter(|m| m.lays() && m.role == "External perimeter");
+    let depths: Vec<f64> = walls
+        .filter(|m| m.layer > Some(0))
+        .map(|m| m.at(1.0))
+        .map(|[x, y, _]| 6.0 - 0.225 - x.abs().max(y.abs()))
+        .collect();
+    let deepest = depths.iter().fold(0.0, |a: f64, b| a.max(*b));
+    assert!(depths.iter().all(|d| *d > -0.01), "nothing sticks out");
+    // A side of the wall that cuts a corner lies deeper there.
+    assert!((0.25..0.6).contains(&deepest), "{deepest}");
+}
+
+/// The report of a slice in which the surface is left to rhumb.
+fn weighed(mesh: &Mesh) -> serde_json::Value {
+    let scratch = Scratch::new();
+    scratch.file("m.stl", mesh::stl::write(mesh));
+    let arguments = ["slice", "m.stl", "-o", "x.gcode", "--json", "--layers", "auto"];
+    let slim = ["--orient", "keep", "--set", "nozzle_flat_radius_mm=0.2"];
+    let ran = scratch.run(&[&arguments[..], &slim[..]].concat()).expect(0);
+    serde_json::from_str(&ran.out).unwrap()
+}
+
+#[test]
+fn layers_are_chosen_by_what_hangs_over() {
+    let cube = weighed(&mesh::shapes::cube(10.0));
+    assert_eq!(cube["layers"]["kind"], "planar");
+    assert_eq!(cube["layers"]["weighed"]["chosen"], "planar");
+    assert_eq!(cube["layers"]["weighed"]["candidates"].as_array().unwrap().len(), 3);
+    // A hat that leans out by 60° from the vertical: cones along it carry what planes do not.
+    let hat =
+        [[0.0, 0.0], [3.0, 0.0], [3.0, 6.0], [10.0, 2.0], [10.0, 3.0], [3.0, 8.0], [0.0, 8.0]];
+    let hat = weighed(&mesh::shapes::revolved(&hat, 60));
+    let layers = &hat["layers"];
+    assert_eq!(layers["kind"], "conical", "{}", layers["weighed"]);
+    let area = |k: usize| layers["weighed"]["candidates"][k]["unsupported_mm2"].as_f64().unwrap();
+    assert!(area(1) < 0.2 * area(0), "{}", layers["weighed"]);
+    assert!(layers["weighed"]["why"].as_str().unwrap().contains("unsupported"));
 }

@@ -19,6 +19,8 @@ use crate::seam::{Begin, SeamMemory, SeamPosition, nearest};
 pub struct OrderParams {
     /// Where walls begin.
     pub seam: SeamPosition,
+    /// Whether infill comes before walls, where layers are flat.
+    pub infill_first: bool,
     /// Whether the external wall comes before those behind it.
     pub external_first: bool,
     /// Whether lower lines come before higher ones: on curved layers.
@@ -87,6 +89,24 @@ struct Ordering<'a> {
 
 impl Ordering<'_> {
     fn island(&mut self, island: &IslandPaths) {
+        if self.params.infill_first {
+            self.fills(island);
+            self.wall_groups(island);
+        } else {
+            self.wall_groups(island);
+            self.fills(island);
+        }
+        self.ironing(island);
+    }
+
+    /// Runs over all else of an island, in their own order.
+    fn ironing(&mut self, island: &IslandPaths) {
+        for path in &island.ironing {
+            self.fill(path, false);
+        }
+    }
+
+    fn wall_groups(&mut self, island: &IslandPaths) {
         let mut groups: Vec<&WallGroup> =
             island.walls.iter().filter(|group| !group.loops.is_empty()).collect();
         while !groups.is_empty() {
@@ -98,6 +118,9 @@ impl Ordering<'_> {
                 .map_or(0, |(k, _)| k);
             self.walls(groups.remove(k));
         }
+    }
+
+    fn fills(&mut self, island: &IslandPaths) {
         let fills: Vec<&Toolpath> = island.fills.iter().collect();
         for (fill, reversed) in tour(&fills, self.nozzle) {
             self.fill(fill, reversed);
@@ -140,6 +163,7 @@ impl Ordering<'_> {
                 }
             }
         }
+        self.ironing(island);
     }
 
     /// The walls along one outline, all begun next to the seam of the external one.
@@ -410,7 +434,12 @@ mod tests {
     }
 
     fn ordered(layer: &LayerPaths, external_first: bool) -> Vec<OrderedLine> {
-        let params = OrderParams { seam: SeamPosition::Nearest, external_first, uphill: false };
+        let params = OrderParams {
+            seam: SeamPosition::Nearest,
+            infill_first: false,
+            external_first,
+            uphill: false,
+        };
         order(layer, Point2::origin(), &mut SeamMemory::default(), &params)
     }
 
@@ -464,8 +493,12 @@ mod tests {
         let fills = vec![raised(slope, &[4.0, 2.0])];
         let island = IslandPaths { walls: vec![walls], fills, ..IslandPaths::default() };
         let layer = LayerPaths { islands: vec![island], ..LayerPaths::default() };
-        let params =
-            OrderParams { seam: SeamPosition::Nearest, external_first: false, uphill: true };
+        let params = OrderParams {
+            seam: SeamPosition::Nearest,
+            infill_first: false,
+            external_first: false,
+            uphill: true,
+        };
         let lines = order(&layer, Point2::origin(), &mut SeamMemory::default(), &params);
         let roles: Vec<Role> = lines.iter().map(|line| line.role).collect();
         assert_eq!(roles, [Role::ExternalPerimeter, Role::Perimeter, Role::SolidInfill]);

@@ -185,8 +185,8 @@ impl Units {
 /// The surface that layers follow. A shorter way to write settings.
 #[derive(Debug, Clone, Default, Args)]
 pub struct LayerArguments {
-    /// The surface that layers follow
-    #[arg(long, value_name = "KIND", value_parser = ["planar", "conical", "spherical", "caps"])]
+    /// The surface that layers follow; `auto` weighs planes, cones and spheres for the part
+    #[arg(long, value_name = "KIND", value_parser = ["planar", "conical", "spherical", "caps", "auto"])]
     pub layers: Option<String>,
     /// Slope of conical layers; positive when they fall outwards, negative for bowls; `max` for the
     /// steepest that the nozzle clears

@@ -35,6 +35,7 @@ pub fn check(
         coarse: (job.plan.resample.chord + job.paths.tolerance - USUAL_TOLERANCE).max(0.0),
         volume_per_second: job.plan.filament.volume_per_second,
         mesh: part,
+        moved: job.paths.compensation.greatest(),
         solid: job.paths.skins.all_solid,
         thorough,
     });

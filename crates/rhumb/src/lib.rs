@@ -36,6 +36,7 @@ pub mod base64;
 mod blend;
 pub mod calibration;
 pub mod check;
+pub mod choice;
 pub mod clock;
 pub mod commands;
 pub mod convert;

@@ -23,6 +23,7 @@ use slicer::section::Tears;
 use slicer::toolpath::LostArea;
 use twin::picture::thumbnail::Thumbnail;
 
+use crate::choice::{Choice, choose};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::levels::{Layout, check_cuts};
@@ -73,6 +74,8 @@ pub struct Outcome {
     pub layers: LayerKind,
     /// Their thickness along the normal, mm.
     pub heights: Vec<f64>,
+    /// The surfaces that were weighed, if the user left the choice.
+    pub choice: Option<Choice>,
     /// What hangs over, when layers are curved.
     pub overhang: Option<Overhang>,
     /// The islands that begin in mid-air, each with its layer; part frame.
@@ -117,6 +120,12 @@ pub fn slice(
     warnings.extend(placement_warnings(&given, &placed, fit, job));
     let orient_ms = clock.lap();
 
+    // The slicer works in a frame that turns with the part, so that its choices do too.
+    let turned = Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), -placed.azimuth);
+    let upright = placed.solid.moved(|p| turned * p);
+    let choice = weighed(&upright, &placed, job, watch)?;
+    let chosen = choice.as_ref().map(|choice| job.with_layers(choice.best().kind));
+    let job = chosen.as_ref().unwrap_or(job);
     let (stages, mut layout) = stages(&placed.solid, job)?;
     check_cuts(placed.solid.mesh(), stages.iter().map(|stage| stage.printed.len()).sum(), job)?;
     warnings.extend(layout.warnings(job.schedule.snap));
@@ -125,9 +134,6 @@ pub fn slice(
         .map(|stage| overhangs(placed.solid.mesh(), &*stage.surface, job.orient.overhang_rad));
     let layers_kind = stages.last().map_or(LayerKind::Planar, |stage| stage.kind);
     let schedule_ms = clock.lap();
-    // The slicer works in a frame that turns with the part, so that its choices do too.
-    let turned = Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), -placed.azimuth);
-    let upright = placed.solid.moved(|p| turned * p);
     let mut job = job.clone();
     job.plan.resample.azimuth = placed.azimuth;
     let mut text = Emitter::for_printer(out, job.dialect, &job.printer);
@@ -165,6 +171,7 @@ pub fn slice(
         layout,
         layers: layers_kind,
         heights,
+        choice,
         overhang,
         floating,
         totals,
@@ -172,6 +179,33 @@ pub fn slice(
         warnings,
         timings,
     })
+}
+
+/// The surface that suits the part, where the user left that open.
+fn weighed(
+    upright: &Solid,
+    placed: &Placed,
+    job: &Job,
+    watch: &mut Watch<'_>,
+) -> Result<Option<Choice>, Failure> {
+    let time = |job: &Job| time_of(upright, placed, job, watch);
+    job.choose_layers.then(|| choose(&placed.solid, job, time)).transpose()
+}
+
+/// How long a part takes to print, s: it is sliced for nobody.
+fn time_of(
+    upright: &Solid,
+    placed: &Placed,
+    job: &Job,
+    watch: &mut Watch<'_>,
+) -> Result<f64, Failure> {
+    let (stages, _) = stages(&placed.solid, job)?;
+    check_cuts(placed.solid.mesh(), stages.iter().map(|stage| stage.printed.len()).sum(), job)?;
+    let mut job = job.clone();
+    job.plan.resample.azimuth = placed.azimuth;
+    let mut nobody = std::io::sink();
+    let mut text = Emitter::for_printer(&mut nobody as &mut dyn Write, job.dialect, &job.printer);
+    Ok(layers(upright, &stages, &job, &mut text, watch)?.totals.time)
 }
 
 fn unusable(class: &'static str, error: &dyn std::error::Error, hint: Option<String>) -> Failure {

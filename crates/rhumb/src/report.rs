@@ -98,6 +98,9 @@ pub struct Layers {
     pub flats: Vec<Flat>,
     /// Area too thin for any bead, summed over the layers.
     pub lost_mm2: f64,
+    /// The surfaces that were weighed, when the choice was left to rhumb.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weighed: Option<Weighed>,
     /// Area that hangs over with planar layers; only for curved ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub overhang_planar_mm2: Option<f64>,
@@ -106,6 +109,34 @@ pub struct Layers {
     pub overhang_mm2: Option<f64>,
     /// Islands that begin in mid-air, with nothing below.
     pub floating: Vec<FloatingIsland>,
+}
+
+/// Surfaces that were weighed for a part.
+#[derive(Debug, Clone, Serialize)]
+pub struct Weighed {
+    /// All of them, planes first.
+    pub candidates: Vec<WeighedSurface>,
+    /// The one that was taken.
+    pub chosen: String,
+    /// The steepest cone that the nozzle clears, of those tried.
+    pub steepest_deg: f64,
+    /// The reason, in words.
+    pub why: String,
+}
+
+/// A surface that was weighed.
+#[derive(Debug, Clone, Serialize)]
+pub struct WeighedSurface {
+    /// What it is.
+    pub surface: String,
+    /// Area that hangs over.
+    pub unsupported_mm2: f64,
+    /// Mean height of stair steps, by the thickness of a layer.
+    pub steps: f64,
+    /// Estimated time.
+    pub time_s: f64,
+    /// What all that comes to; the least is best.
+    pub cost: f64,
 }
 
 /// An island that begins in mid-air.

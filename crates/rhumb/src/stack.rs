@@ -9,6 +9,7 @@ use mesh::topology::Solid;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use slicer::chart::{carried, carried_to_cone};
+use slicer::compensation::{CompensationParams, compensated};
 use slicer::layer::{Filled, fill_layer};
 use slicer::level::Level;
 use slicer::lift::Lift;
@@ -63,7 +64,14 @@ impl<'a> Stack<'a> {
         let cut: Vec<(Section, Region)> = (have..want)
             .into_par_iter()
             .map(|k| {
-                let section = self.section(k);
+                let mut section = self.section(k);
+                let level = &self.stage.levels[k];
+                let is_first = level.index == 0 && self.stage.floor.is_none();
+                let chart = self.stage.surface.chart(level.middle());
+                let how = &self.job.paths.compensation;
+                if *how != CompensationParams::default() {
+                    section.region = compensated(section.region, is_first, &chart, how);
+                }
                 let cover = section.region.thinned(SKIN_TOLERANCE_MM);
                 (section, cover)
             })

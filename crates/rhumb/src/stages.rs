@@ -68,7 +68,7 @@ impl LayerKind {
         }
     }
 
-    fn surface(self) -> Result<Box<dyn LayerSurface>, SurfaceError> {
+    pub(crate) fn surface(self) -> Result<Box<dyn LayerSurface>, SurfaceError> {
         Ok(match self {
             Self::Planar => Box::new(Plane),
             Self::Conical(angle) => Box::new(Cone::new(angle)?),
@@ -261,6 +261,11 @@ fn within_clearance(solid: &Solid, job: &Job) -> Result<LayerKind, Failure> {
 
 pub(crate) fn unfit(error: &SurfaceError) -> Failure {
     Failure::new("OutOfEnvelope", error.to_string())
+}
+
+/// The greatest distance of a part from the axis, mm.
+pub(crate) fn radius(part: &Mesh) -> f64 {
+    extent(part).radius
 }
 
 pub(crate) fn extent(part: &Mesh) -> Extent {

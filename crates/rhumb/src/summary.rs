@@ -7,12 +7,13 @@ use nalgebra::{Point3, Rotation3, Vector3};
 use twin::verify::Verdict;
 
 use crate::check::findings;
+use crate::choice::Choice;
 use crate::pipeline::{Outcome, part};
 use crate::place::volume;
 use crate::program_text::duration;
 use crate::report::{
     FloatingIsland, Layers, MeshHealth, Model, Orientation, OrientationCandidate, Print, Report,
-    SlowFlow, Verify, tidy,
+    SlowFlow, Verify, Weighed, WeighedSurface, tidy,
 };
 use crate::settings::Job;
 use machine::gcode::decimal;
@@ -53,6 +54,7 @@ pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Jo
             heights_mm: outcome.heights.iter().map(|&height| tidy(height)).collect(),
             flats: outcome.layout.report(),
             lost_mm2: outcome.lost.area,
+            weighed: outcome.choice.as_ref().map(weighed),
             overhang_planar_mm2: outcome.overhang.map(|overhang| tidy(overhang.planar)),
             overhang_mm2: outcome.overhang.map(|overhang| tidy(overhang.chosen)),
             floating: floating(outcome),
@@ -72,6 +74,39 @@ pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Jo
         verify: Verify { findings: verdict.map(findings).unwrap_or_default() },
         timings_ms: outcome.timings.clone(),
         warnings: outcome.warnings.clone(),
+    }
+}
+
+/// What was weighed, and why which was taken.
+fn weighed_rows(choice: &Choice) -> Vec<(&'static str, String)> {
+    let candidates = choice.candidates.iter().map(|candidate| {
+        let text = format!(
+            "{}: {} mm² unsupported, steps {} of a layer, {} min",
+            candidate.kind.describe(),
+            decimal(candidate.unsupported, 0),
+            decimal(candidate.steps, 2),
+            decimal(candidate.time / 60.0, 1)
+        );
+        ("weighed", text)
+    });
+    let steepest = decimal(choice.steepest.to_degrees(), 0);
+    let why = format!("{}; the nozzle clears {steepest}°", choice.why());
+    candidates.chain([("chosen", why)]).collect()
+}
+
+fn weighed(choice: &Choice) -> Weighed {
+    let candidates = choice.candidates.iter().map(|candidate| WeighedSurface {
+        surface: candidate.kind.describe(),
+        unsupported_mm2: tidy(candidate.unsupported),
+        steps: tidy(candidate.steps),
+        time_s: candidate.time,
+        cost: tidy(candidate.cost),
+    });
+    Weighed {
+        candidates: candidates.collect(),
+        chosen: choice.best().kind.describe(),
+        steepest_deg: tidy(choice.steepest.to_degrees()),
+        why: choice.why(),
     }
 }
 
@@ -137,6 +172,7 @@ pub fn text(
         ),
     );
     row("layers", format!("{} of {} mm", report.layers.count, heights(report, job)));
+    outcome.choice.iter().flat_map(weighed_rows).for_each(|(label, text)| row(label, text));
     if let Some(overhang) = outcome.overhang {
         row("surface", outcome.layers.describe());
         row(

@@ -4,13 +4,17 @@ use geom::grid::{GridPoint, mm};
 use geom::region::{Fill, Island, Region};
 use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
+use std::f64::consts::FRAC_PI_2;
 
 use crate::adhesion::{AdhesionParams, around};
 use crate::bead::Bead;
 use crate::bridge::bridges;
 use crate::chart::Chart;
+use crate::compensation::CompensationParams;
+use crate::fuzzy::{FuzzyParams, roughened};
 use crate::hanging::Below;
-use crate::infill::{FillLayer, FillLine, InfillParams, fill, fill_bridge};
+use crate::infill::ironing::ironing;
+use crate::infill::{FillLayer, FillLine, InfillParams, angle_in, fill, fill_bridge};
 use crate::lift::Lift;
 use crate::skins::{Neighbours, SKIN_TOLERANCE_MM, SkinParams, skins};
 use crate::thin::{AxisPoint, ThinParams, axes};
@@ -30,6 +34,10 @@ pub struct PathParams {
     pub infill: InfillParams,
     /// Loops around the first layer.
     pub adhesion: AdhesionParams,
+    /// How far outlines move before all that.
+    pub compensation: CompensationParams,
+    /// How rough outer walls are, if they are.
+    pub fuzzy: Option<FuzzyParams>,
     /// How far simplified lines may lie from their course, mm.
     pub tolerance: f64,
 }
@@ -170,6 +178,10 @@ fn fill_island(
         Some(below) => bridges(&mut skins, below, &chart, spacing),
         None => Vec::new(),
     };
+    let ironed = params.infill.ironing.map_or_else(Vec::new, |how| {
+        let across = angle_in(&layer, &params.infill) + FRAC_PI_2;
+        ironing(&skins.top, across, &layer, &how)
+    });
     let mut filling = fill(&skins, &layer, &params.infill);
     for bridge in &bridges {
         fill_bridge(bridge, &layer, &params.infill, &mut filling);
@@ -186,10 +198,13 @@ fn fill_island(
     let groups = walls.groups.iter().map(|group| {
         let loops = group.iter().map(|wall| {
             let role = if wall.depth == 0 { Role::ExternalPerimeter } else { Role::Perimeter };
+            let rough = params.fuzzy.filter(|_| wall.depth == 0 && index > 0);
+            let points = rough.map(|how| roughened(&wall.points, index, &how));
+            let points = points.as_ref().unwrap_or(&wall.points);
             let stations = if hanging.is_open() {
-                frame.lift.hanging_stations(&hanging.along(&wall.points))
+                frame.lift.hanging_stations(&hanging.along(points))
             } else {
-                frame.lift.stations(&wall.points, true)
+                frame.lift.stations(points, true)
             };
             Toolpath { role, closed: true, stations }
         });
@@ -200,6 +215,7 @@ fn fill_island(
         walls: groups.collect(),
         outline: frame.seen_from_above(outline),
         fills,
+        ironing: ironed.iter().map(|line| frame.fill(line)).collect(),
         in_order: in_order
             .map(|lines| lines.iter().map(|line| frame.fill(line)).collect())
             .collect(),

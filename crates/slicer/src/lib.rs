@@ -7,13 +7,16 @@
 //! [`level`] says where they lie, [`section`] cuts the mesh, [`walls`], [`thin`], [`skins`] and
 //! [`infill`] fill an island, [`adhesion`] surrounds the first layer, [`layer`] puts it together
 //! into [`toolpath`]s of [`bead`]s. [`stacking`] tells how thick beads are on a flat base,
-//! [`overhang`] what hangs in the air, [`clearance`] how steep layers may be.
+//! [`overhang`] what hangs in the air, [`bridge`] what spans a gap, [`clearance`] how steep layers may
+//! be; [`compensation`] and [`fuzzy`] move outlines on purpose.
 
 pub mod adhesion;
 pub mod bead;
 pub mod bridge;
 pub mod chart;
 pub mod clearance;
+pub mod compensation;
+pub mod fuzzy;
 pub(crate) mod hanging;
 pub mod infill;
 pub mod layer;

@@ -123,6 +123,8 @@ pub struct IslandPaths {
     pub fills: Vec<Toolpath>,
     /// Open lines that are laid one after the other as they are, after all else of the island.
     pub in_order: Vec<Vec<Toolpath>>,
+    /// Lines over all else of the island.
+    pub ironing: Vec<Toolpath>,
 }
 
 impl IslandPaths {

@@ -170,8 +170,9 @@ impl<'a> Watch<'a> {
         let is_inside = footing.resting < footing.covered && self.is_inside(&ends, segment.role);
         let step = Step { line: segment.line, layer: segment.layer, ends, footing, is_inside };
         self.follow.piece(&step, findings);
-        // What fills a gap between walls lies between and under their round sides.
-        if segment.role != Role::GapFill {
+        // What fills a gap between walls lies between and under their round sides; ironing lies on
+        // what it smooths.
+        if !matches!(segment.role, Role::GapFill | Role::Ironing) {
             self.overlap.piece(&step, findings);
         }
         let Some(hollow) = &mut self.hollow else { return };

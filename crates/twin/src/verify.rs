@@ -6,8 +6,8 @@
 //! # fn example(printer: &machine::profile::Printer, mesh: &mesh::mesh::Mesh, text: &str) {
 //! let filament_area = 2.405;
 //! let setup = Setup { printer, dialect: POLAR, filament_area, multiplier: 1.0,
-//!                     volume_per_second: 11.0, coarse: 0.0, mesh: Some(mesh), solid: false,
-//!                     thorough: false };
+//!                     volume_per_second: 11.0, coarse: 0.0, mesh: Some(mesh), moved: 0.0,
+//!                     solid: false, thorough: false };
 //! let mut verifier = Verifier::new(setup);
 //! for line in text.lines() {
 //!     verifier.line(line);
@@ -67,6 +67,8 @@ pub struct Setup<'a> {
     pub volume_per_second: f64,
     /// The part as it was placed, in the frame of the part.
     pub mesh: Option<&'a Mesh>,
+    /// How far outlines lie from those of the mesh on purpose, mm.
+    pub moved: f64,
     /// Whether the print is meant to be solid.
     pub solid: bool,
     /// Whether to remember all that was laid, and to judge what lies below and around.
@@ -162,8 +164,8 @@ impl<'a> Verifier<'a> {
             heat: Heat::new(printer),
             surface: Surface::new(printer),
             flow: Flow::new(printer, meant, setup.volume_per_second / setup.multiplier),
-            volume: Volume::new(meant, printer.nozzle_diameter),
-            deposit: Deposit::new(printer, meant, setup.coarse),
+            volume: Volume::new(meant, printer.nozzle_diameter).moved(setup.moved),
+            deposit: Deposit::new(printer, meant, setup.coarse).moved(setup.moved),
             watch: setup.thorough.then(|| Watch::new(&setup)),
             part: mesh.map(Part::new),
             setup,

@@ -18,7 +18,9 @@ use plan::route::{FilamentParams, Speeds};
 use plan::seam::SeamPosition;
 use slicer::adhesion::AdhesionParams;
 use slicer::clearance::NozzleProfile;
-use slicer::infill::{InfillParams, Pattern, SolidPattern};
+use slicer::compensation::CompensationParams;
+use slicer::fuzzy::FuzzyParams;
+use slicer::infill::{InfillParams, IroningParams, Pattern, SolidPattern};
 use slicer::layer::PathParams;
 use slicer::level::adaptive::AdaptiveParams;
 use slicer::level::{ScheduleParams, Snap};
@@ -49,6 +51,8 @@ pub struct Job {
     pub least_flat_mm2: f64,
     /// The surface that layers follow.
     pub layers: LayerKind,
+    /// Whether the surface is chosen for each part.
+    pub choose_layers: bool,
     /// Whether a cone too steep for the nozzle is lowered.
     pub lower_cone: bool,
     /// The shape of the nozzle.
@@ -86,6 +90,16 @@ pub struct Job {
 pub const MOST_CUTS: f64 = 1e9;
 
 impl Job {
+    /// Returns the same job with layers that follow another surface.
+    #[must_use]
+    pub fn with_layers(&self, kind: LayerKind) -> Self {
+        let mut job = self.clone();
+        let curved = kind != LayerKind::Planar;
+        (job.layers, job.choose_layers, job.lower_cone) = (kind, false, false);
+        (job.plan.curved, job.plan.order.uphill) = (curved, curved);
+        job
+    }
+
     /// Checks settings against each other and returns the parameters of all stages.
     ///
     /// # Errors
@@ -113,6 +127,7 @@ impl Job {
             },
             least_flat_mm2: get.number("flat_area_min_mm2"),
             layers: layers(&get),
+            choose_layers: get.text("layers") == "auto",
             lower_cone: get.switch("cone_angle_max"),
             nozzle: NozzleProfile {
                 flat_radius: get.number("nozzle_flat_radius_mm"),
@@ -406,6 +421,12 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
             top_width: get.number("top_infill_extrusion_width_mm"),
             longest_join: get.number("infill_anchor_max_mm"),
             bridge_flow: get.number("bridge_flow_ratio"),
+            overlap: get.number("infill_overlap"),
+            ironing: get.switch("ironing").then(|| IroningParams {
+                spacing: get.number("ironing_spacing_mm"),
+                flow: get.number("ironing_flow"),
+                inset: get.number("top_infill_extrusion_width_mm") / 2.0,
+            }),
         },
         adhesion: AdhesionParams {
             skirts: get.count("skirts"),
@@ -414,6 +435,15 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
             brim_separation: get.number("brim_separation_mm"),
             reach: printer.rail.max,
         },
+        compensation: CompensationParams {
+            all: get.number("xy_size_compensation_mm"),
+            holes: get.number("hole_size_compensation_mm"),
+            first_layer: get.number("elefant_foot_compensation_mm"),
+        },
+        fuzzy: get.switch("fuzzy_skin").then(|| FuzzyParams {
+            depth: get.number("fuzzy_skin_thickness_mm"),
+            step: get.number("fuzzy_skin_point_dist_mm"),
+        }),
         tolerance: tolerances.simplify_mm(),
     }
 }
@@ -458,6 +488,7 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
                 "corner" => SeamPosition::Corner,
                 _ => SeamPosition::Aligned,
             },
+            infill_first: get.switch("infill_first"),
             external_first: get.switch("external_perimeters_first"),
             uphill: curved,
         },
@@ -470,7 +501,7 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
             gap_fill: get.number("gap_fill_speed_mm_per_s"),
             bridge: get.number("bridge_speed_mm_per_s"),
             overhang: [3, 2, 1, 0].map(|k| get.number(&format!("overhang_speed_{k}_mm_per_s"))),
-            ironing: get.number("top_solid_infill_speed_mm_per_s"),
+            ironing: get.number("ironing_speed_mm_per_s"),
             support: [get.number("infill_speed_mm_per_s"); 2],
             first_layer: get.number("first_layer_speed_mm_per_s"),
             travel: get.number("travel_speed_mm_per_s"),

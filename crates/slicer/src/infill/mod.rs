@@ -12,6 +12,7 @@ pub(crate) mod clip;
 mod concentric;
 mod field;
 mod honeycomb;
+pub(crate) mod ironing;
 mod link;
 mod monotonic;
 mod rectilinear;
@@ -23,6 +24,7 @@ use geom::simplify::simplify_line;
 use geom::spiral::Turning;
 use nalgebra::Point2;
 
+pub use self::ironing::IroningParams;
 use self::link::JoinParams;
 use crate::bead::Bead;
 use crate::bridge::Bridge;
@@ -106,6 +108,10 @@ pub struct InfillParams {
     pub longest_join: f64,
     /// Material of a bridge by what its place holds.
     pub bridge_flow: f64,
+    /// How far sparse lines reach into the walls, in widths.
+    pub overlap: f64,
+    /// How tops are ironed, if they are.
+    pub ironing: Option<IroningParams>,
 }
 
 /// A line of infill in the chart.
@@ -249,7 +255,7 @@ pub(crate) fn fill_bridge(
 }
 
 /// The direction of parallel lines in a layer.
-fn angle_in(layer: &FillLayer<'_>, params: &InfillParams) -> f64 {
+pub(crate) fn angle_in(layer: &FillLayer<'_>, params: &InfillParams) -> f64 {
     params.angle + if layer.index.is_multiple_of(2) { 0.0 } else { std::f64::consts::FRAC_PI_2 }
 }
 
@@ -394,6 +400,8 @@ mod tests {
         top_width: 0.45,
         longest_join: 10.0,
         bridge_flow: 1.0,
+        overlap: 0.0,
+        ironing: None,
     };
 
     const PATTERNS: [Pattern; 10] = [

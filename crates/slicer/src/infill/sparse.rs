@@ -40,6 +40,7 @@ const MOST_STEPS: f64 = 2048.0;
 pub(super) fn fill(area: &Region, layer: &FillLayer<'_>, params: &InfillParams) -> Vec<FillLine> {
     let bead = Bead { width: params.width, thickness: layer.thickness };
     let spacing = bead.spacing() / params.density;
+    let from_edge = (bead.spacing() / 2.0 - params.overlap * bead.width).max(0.0);
     match params.pattern {
         Pattern::Concentric => {
             let loops = concentric::sparse(area, &layer.chart, bead.spacing() / 2.0, spacing);
@@ -47,7 +48,7 @@ pub(super) fn fill(area: &Region, layer: &FillLayer<'_>, params: &InfillParams) 
         }
         Pattern::Archimedean => {
             // Sparse lines must stand on those of the layer below: neither phase nor sense changes.
-            let core = layer.chart.inset(area, bead.spacing() / 2.0);
+            let core = layer.chart.inset(area, from_edge);
             let turning = Turning::CounterClockwise;
             let chords = spiral::chords(&core, spacing, 0.0, turning, layer.tolerance);
             let joins = joins(params);
@@ -55,7 +56,7 @@ pub(super) fn fill(area: &Region, layer: &FillLayer<'_>, params: &InfillParams) 
         }
         _ => {}
     }
-    let core = layer.chart.inset(area, bead.spacing() / 2.0);
+    let core = layer.chart.inset(area, from_edge);
     let sparse = Sparse {
         area: layer.chart.region_from_above(&core),
         spacing: spacing * closeness(params.pattern, layer),

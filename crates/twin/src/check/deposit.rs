@@ -80,6 +80,8 @@ pub(crate) struct Deposit {
     family: Family,
     alignment: Alignment,
     filament_area: f64,
+    /// How far outlines lie from those of the mesh on purpose, mm.
+    moved: f64,
     top: f64,
     /// Half the thickness of the layer, mm.
     half_height: f64,
@@ -99,6 +101,12 @@ impl Deposit {
         Self { alignment: printer.alignment, filament_area, coarse, ..Self::default() }
     }
 
+    /// Allows for outlines that are moved by as much on purpose, mm.
+    #[must_use]
+    pub(crate) fn moved(self, by: f64) -> Self {
+        Self { moved: by, ..self }
+    }
+
     /// Begins a layer.
     pub(crate) fn layer(&mut self, mark: &LayerMark) {
         self.samples.clear();
@@ -113,6 +121,8 @@ impl Deposit {
     pub(crate) fn segment(&mut self, segment: &Segment) {
         // Walls that hang over are outer ones, or lie inside of one.
         let is_outer = matches!(segment.role, Role::ExternalPerimeter | Role::OverhangPerimeter);
+        // Of a bead that was moved by half its width nothing need lie within the mesh.
+        let is_outer = is_outer && segment.width > 2.0 * self.moved;
         if !is_outer || !segment.extrudes() || !self.is_sound {
             return;
         }
@@ -137,7 +147,7 @@ impl Deposit {
                 line: segment.line,
                 middle,
                 side: aside / length,
-                half_width: segment.width / 2.0,
+                half_width: segment.width / 2.0 - self.moved,
                 half_height,
             });
         }

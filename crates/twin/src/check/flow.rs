@@ -137,7 +137,9 @@ impl Flow {
                 )
             });
         }
-        let role = Role::ALL.iter().position(|role| *role == segment.role);
+        // The width that ironing is announced with is rounded by a tenth of it.
+        let is_told = segment.role != Role::Ironing;
+        let role = Role::ALL.iter().position(|role| *role == segment.role && is_told);
         if let Some(role) = role.filter(|_| is_planar && self.ground.is_none() && share.is_finite())
         {
             let class = (share.min(THICKEST) / CLASS) as usize;

@@ -2,7 +2,8 @@
 //!
 //! What a layer holds is the area of the mesh's section at the middle of the layer times its
 //! height; what is laid is filament times its cross-section. Skirt, brim, priming
-//! (`Custom`) and supports are not the part's.
+//! (`Custom`), supports and ironing are not the part's. Outlines that are moved on purpose count
+//! as a wider border.
 //!
 //! * A layer may hold more than its section by [`LAYER_SHARE`] of it, plus [`BORDER`] times its
 //!   outline, plus one bead's dot.
@@ -71,6 +72,8 @@ pub struct LayerVolume {
 pub(crate) struct Volume {
     filament_area: f64,
     nozzle: f64,
+    /// How far outlines may lie from those of the mesh, mm.
+    border: f64,
     layers: Vec<LayerVolume>,
     /// Filament by role, in the order of [`Role::ALL`], mm.
     by_role: [f64; Role::ALL.len()],
@@ -82,7 +85,13 @@ impl Volume {
     #[must_use]
     pub(crate) fn new(filament_area: f64, nozzle: f64) -> Self {
         let by_role = [0.0; Role::ALL.len()];
-        Self { filament_area, nozzle, layers: Vec::new(), by_role, filament: 0.0 }
+        Self { filament_area, nozzle, border: BORDER, layers: Vec::new(), by_role, filament: 0.0 }
+    }
+
+    /// Allows for outlines that are moved by as much on purpose, mm.
+    #[must_use]
+    pub(crate) fn moved(self, by: f64) -> Self {
+        Self { border: BORDER + by, ..self }
     }
 
     pub(crate) fn segment(&mut self, segment: &Segment) {
@@ -151,7 +160,8 @@ impl Volume {
             return Some("volume: no layers are announced, material is not compared");
         };
         let place = Place::line(last.line, Some(last.index));
-        let flat: Option<Vec<Bill>> = self.layers.iter().map(Bill::of).collect();
+        let flat: Option<Vec<Bill>> =
+            self.layers.iter().map(|layer| Bill::of(layer, self.border)).collect();
         let laid: f64 = self.layers.iter().map(|layer| layer.part).sum();
         let (bill, note) = if let Some(layers) = flat {
             for (layer, bill) in self.layers.iter().zip(&layers) {
@@ -187,7 +197,7 @@ impl Volume {
         let height = self.layers.iter().filter_map(|layer| layer.height).fold(0.0, f64::max);
         // An outline times the thickness of its layer is a piece of the surface.
         let edges = enclosed.surface * height * (1.0 - FRAC_PI_4) / 2.0;
-        Bill { section: enclosed.volume, border: enclosed.surface * BORDER, edges }
+        Bill { section: enclosed.volume, border: enclosed.surface * self.border, edges }
     }
 }
 
@@ -211,15 +221,15 @@ struct Bill {
 
 impl Bill {
     /// `None` where a plane section says nothing.
-    fn of(layer: &LayerVolume) -> Option<Self> {
+    fn of(layer: &LayerVolume, border: f64) -> Option<Self> {
         let (height, area) = (layer.height?, layer.area?);
-        let borders = Self::for_outline(layer.outline, height);
+        let borders = Self::for_outline(layer.outline, height, border);
         layer.is_plane.then_some(Self { section: area * height, ..borders })
     }
 
-    fn for_outline(outline: f64, height: f64) -> Self {
+    fn for_outline(outline: f64, height: f64, border: f64) -> Self {
         let edges = outline * height * height * (1.0 - FRAC_PI_4) / 2.0;
-        Self { section: 0.0, border: outline * height * BORDER, edges }
+        Self { section: 0.0, border: outline * height * border, edges }
     }
 
     fn plus(self, other: &Self) -> Self {
@@ -253,7 +263,14 @@ fn whole(laid: f64, bill: &Bill, is_solid: bool, place: Place, findings: &mut Fi
 }
 
 fn is_part(role: Role) -> bool {
-    !matches!(role, Role::SkirtBrim | Role::SupportMaterial | Role::SupportInterface | Role::Custom)
+    !matches!(
+        role,
+        Role::SkirtBrim
+            | Role::SupportMaterial
+            | Role::SupportInterface
+            | Role::Ironing
+            | Role::Custom
+    )
 }
 
 fn role_index(role: Role) -> usize {

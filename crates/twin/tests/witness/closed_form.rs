@@ -37,6 +37,7 @@ fn judged(printer: &Printer) -> Verdict {
         volume_per_second: f64::INFINITY,
         mesh: None,
         solid: false,
+        moved: 0.0,
         thorough: false,
     };
     let mut verifier = Verifier::new(setup);

@@ -83,6 +83,7 @@ fn findings(run: &Run, printer: &Printer) -> Vec<String> {
         volume_per_second: f64::INFINITY,
         mesh: None,
         solid: false,
+        moved: 0.0,
         thorough: false,
     };
     let mut verifier = Verifier::new(setup);

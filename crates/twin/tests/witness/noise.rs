@@ -19,6 +19,7 @@ fn judge(lines: &[Vec<u8>]) -> usize {
             volume_per_second: f64::INFINITY,
             mesh: Some(&mesh),
             solid: true,
+            moved: 0.0,
             thorough: false,
         };
         let mut verifier = Verifier::new(setup);

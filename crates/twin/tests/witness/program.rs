@@ -141,6 +141,7 @@ pub(crate) fn judged(lines: &[String], printer: &Printer) -> Verdict {
         volume_per_second: f64::INFINITY,
         mesh: Some(&mesh),
         solid: true,
+        moved: 0.0,
         thorough: false,
     };
     let mut verifier = Verifier::new(setup);
@@ -183,6 +184,7 @@ fn a_cartesian_program_is_judged_without_joints() {
         volume_per_second: f64::INFINITY,
         mesh: None,
         solid: false,
+        moved: 0.0,
         thorough: false,
     };
     let mut verifier = Verifier::new(setup);

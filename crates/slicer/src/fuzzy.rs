@@ -1,0 +1,91 @@
+//! Rough outer walls, for grip and for looks.
+//!
+//! The outermost wall is followed in steps of about the given distance, and each point is moved
+//! inwards by a random amount. The part does not grow, and the same print comes out every time:
+//! the amounts depend on the layer and the place in it alone.
+
+use nalgebra::{Point2, Vector2};
+
+use crate::bead::Bead;
+
+/// How rough outer walls are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FuzzyParams {
+    /// The greatest way inwards, mm; 0 for smooth walls.
+    pub depth: f64,
+    /// Mean distance of the points, mm.
+    pub step: f64,
+}
+
+/// Roughens a closed line with the material on its left.
+#[must_use]
+pub fn roughened(
+    line: &[(Point2<f64>, Bead)],
+    layer: usize,
+    params: &FuzzyParams,
+) -> Vec<(Point2<f64>, Bead)> {
+    let Some(&(first, _)) = line.first() else { return Vec::new() };
+    let seed = (layer as u64) << 40 ^ (first.x * 1e3).to_bits() ^ (first.y * 1e3).to_bits() << 7;
+    let mut random = Random(seed);
+    let mut rough = Vec::new();
+    // The way left to the next point.
+    let mut left = params.step * random.next();
+    for (k, (from, bead)) in line.iter().enumerate() {
+        let (to, to_bead) = &line[(k + 1) % line.len()];
+        let side = to - from;
+        let length = side.norm();
+        if length == 0.0 {
+            continue;
+        }
+        let inwards = Vector2::new(-side.y, side.x) / length;
+        let mut along = left;
+        while along < length {
+            let share = along / length;
+            let bead = Bead {
+                width: bead.width + (to_bead.width - bead.width) * share,
+                thickness: bead.thickness + (to_bead.thickness - bead.thickness) * share,
+            };
+            rough.push((from + side * share + inwards * (params.depth * random.next()), bead));
+            // Half to one and a half steps.
+            along += params.step * (0.5 + random.next());
+        }
+        left = along - length;
+    }
+    // A line too short for it stays as it is.
+    if rough.len() < 3 { line.to_vec() } else { rough }
+}
+
+/// Numbers from 0 to 1 that look random (splitmix64).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wall_becomes_rough_within_its_depth() {
+        let bead = Bead { width: 0.45, thickness: 0.2 };
+        let corners = [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]];
+        let line = corners.map(|p| (Point2::from(p), bead));
+        let params = FuzzyParams { depth: 0.3, step: 0.8 };
+        let rough = roughened(&line, 7, &params);
+        assert!((85..115).contains(&rough.len()), "{} points", rough.len());
+        let depths: Vec<f64> =
+            rough.iter().map(|(p, _)| p.x.min(p.y).min(20.0 - p.x).min(20.0 - p.y)).collect();
+        assert!(depths.iter().all(|d| (-1e-9..0.3 + 1e-9).contains(d)));
+        let mean = depths.iter().sum::<f64>() / depths.len() as f64;
+        assert!((0.1..0.2).contains(&mean), "{mean}");
+        assert_eq!(roughened(&line, 7, &params), rough);
+        assert_ne!(roughened(&line, 8, &params), rough);
+    }
+}
