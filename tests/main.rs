@@ -19,6 +19,7 @@ mod golden;
 mod house;
 mod interrupt;
 mod limits;
+mod models;
 mod motor;
 mod mutants;
 mod names;

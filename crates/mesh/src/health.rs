@@ -237,8 +237,14 @@ impl Health {
 
     /// Puts what was said about the file before what is said about the mesh.
     #[must_use]
-    pub fn with_read(mut self, read: &ReadReport) -> Self {
-        self.notes.splice(0..0, read.notes.iter().cloned());
+    pub fn with_read(self, read: &ReadReport) -> Self {
+        self.with_notes(&read.notes)
+    }
+
+    /// Puts some notes before what is said about the mesh.
+    #[must_use]
+    pub fn with_notes(mut self, notes: &[Note]) -> Self {
+        self.notes.splice(0..0, notes.iter().cloned());
         self
     }
 

@@ -12,7 +12,7 @@
 //! ```
 //!
 //! In reading order: [`soup`] holds loose facets and [`mesh`] shared vertices; [`stl`] reads and
-//! writes files; [`weld`] joins corners; [`topology`] finds sides and shells; [`repair`] closes
+//! writes files, and [`model`] reads 3MF and OBJ too; [`weld`] joins corners; [`topology`] finds sides and shells; [`repair`] closes
 //! and turns; [`overlap`] finds surfaces that cross; [`health`] does it all and sums it up in
 //! [`note`]s; [`measure`] gives volumes and moments; [`orient`] and [`place`] put a part on the
 //! bed; [`flats`] are the faces that its layers should meet; [`shapes`] are solids that are known exactly.
@@ -32,12 +32,14 @@
 //! assert!(health.with_read(&read).notes.is_empty());
 //! ```
 
+pub mod cut;
 pub mod flats;
 mod groups;
 pub mod health;
 mod inside;
 pub mod measure;
 pub mod mesh;
+pub mod model;
 pub mod note;
 pub mod orient;
 pub mod overlap;

@@ -141,22 +141,77 @@ impl SettingsArguments {
 pub struct PlaceArguments {
     /// How to lay the model down: flat (on its largest flat face), keep, its rank in the list of
     /// `rhumb orient`, or turns about x, y and z in degrees
+    ///
+    /// By default flat; a 3MF of several objects is kept as it is.
+    #[arg(long, value_name = "flat|keep|RANK|RX,RY,RZ", allow_hyphen_values = true)]
+    pub orient: Option<String>,
+    /// Turn the model about x instead of laying it down, degrees
     #[arg(
         long,
-        value_name = "flat|keep|RANK|RX,RY,RZ",
-        default_value = "flat",
+        value_name = "DEG",
+        default_value_t = 0.0,
+        hide_default_value = true,
+        allow_hyphen_values = true,
+        conflicts_with = "orient"
+    )]
+    pub rotate_x: f64,
+    /// Turn the model about y, after x, instead of laying it down, degrees
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 0.0,
+        hide_default_value = true,
+        allow_hyphen_values = true,
+        conflicts_with = "orient"
+    )]
+    pub rotate_y: f64,
+    /// Turn the model about z once it lies, degrees
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 0.0,
+        hide_default_value = true,
         allow_hyphen_values = true
     )]
-    pub orient: String,
+    pub rotate_z: f64,
+    /// Mirror the model along an axis of its file (repeatable)
+    #[arg(long, value_enum, value_name = "AXIS", action = ArgAction::Append)]
+    pub mirror: Vec<Axis>,
+    /// Cut the part at this height above the bed, mm
+    #[arg(long, value_name = "Z", allow_hyphen_values = true)]
+    pub cut: Option<f64>,
+    /// What is printed of a part that is cut; the upper part is set down
+    #[arg(long, value_enum, default_value_t = Part::Lower, requires = "cut")]
+    pub keep: Part,
     /// Where the part's footprint is centred, mm from the rotation axis
     #[arg(long, value_name = "X,Y", default_value = "0,0", allow_hyphen_values = true)]
     pub place: String,
     /// Scale the model
     #[arg(long, value_name = "S", default_value_t = 1.0)]
     pub scale: f64,
-    /// What a unit of the file is
+    /// What a unit of the file is; a 3MF has its own
     #[arg(long, value_enum, default_value_t = Units::Mm)]
     pub units: Units,
+}
+
+/// An axis of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Axis {
+    /// The first.
+    X,
+    /// The second.
+    Y,
+    /// The third.
+    Z,
+}
+
+/// What is kept of a part that is cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Part {
+    /// What is below.
+    Lower,
+    /// What is above.
+    Upper,
 }
 
 /// Units of a file.
@@ -224,8 +279,20 @@ impl LayerArguments {
 /// Arguments of `slice`.
 #[derive(Debug, Args)]
 pub struct Slice {
-    /// The model, binary or ASCII STL; `-` reads standard input
-    pub model: PathBuf,
+    /// The model: STL, 3MF or OBJ; `-` reads standard input. Several are printed together, layer by
+    /// layer
+    #[arg(required = true, value_name = "MODEL")]
+    pub models: Vec<PathBuf>,
+    /// Where the footprint of each model is centred, mm from the rotation axis, one for each copy of
+    /// each model in their order; packed around the axis by default
+    #[arg(long, value_name = "X,Y", action = ArgAction::Append, allow_hyphen_values = true)]
+    pub at: Vec<String>,
+    /// How far the footprints of several models stay apart, mm
+    #[arg(long, value_name = "MM", default_value_t = 6.0)]
+    pub gap: f64,
+    /// How often to print every model
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=100))]
+    pub copies: u16,
     /// Where the program goes; `-` writes standard output [default: MODEL.gcode]
     #[arg(short, long, value_name = "OUT.gcode")]
     pub output: Option<PathBuf>,
@@ -743,6 +810,14 @@ pub enum Profile {
     Check {
         /// The file
         file: PathBuf,
+    },
+    /// Take over print and filament settings of PrusaSlicer
+    Import {
+        /// What PrusaSlicer exports as a configuration
+        file: PathBuf,
+        /// What the new profiles are called: NAME.print.toml and NAME.material.toml [default: as FILE]
+        #[arg(short, long, value_name = "NAME")]
+        output: Option<PathBuf>,
     },
 }
 

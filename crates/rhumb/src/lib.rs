@@ -46,6 +46,7 @@ pub mod http;
 pub mod input;
 pub mod interrupt;
 pub mod levels;
+pub mod models;
 pub mod output;
 pub mod overhang;
 pub mod page;

@@ -10,10 +10,10 @@ use std::path::Path;
 use geom::bounding::Bounds;
 use machine::gcode::Emitter;
 use machine::program::Step;
-use mesh::health::{Health, solid_from_soup};
+use mesh::health::Health;
 use mesh::mesh::Mesh;
+use mesh::model::Format;
 use mesh::note::Note;
-use mesh::stl;
 use mesh::topology::Solid;
 use nalgebra::Rotation3;
 use plan::planner::{Planner, Totals};
@@ -27,9 +27,10 @@ use crate::choice::{Choice, choose};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::levels::{Layout, check_cuts};
+use crate::models::{self, Arrangement, Model};
 use crate::output;
 use crate::overhang::{Overhang, overhangs};
-use crate::place::{Fit, Placed, Wish, check_envelope, check_size, place, suspect_units};
+use crate::place::{Fit, Placed, Pose, Wish, check_envelope, check_size, place, suspect_units};
 use crate::program_text;
 use crate::progress::Progress;
 use crate::report::{Timings, Warning};
@@ -40,7 +41,7 @@ use crate::stopwatch::Stopwatch;
 
 /// What to slice and how.
 pub struct Request<'a> {
-    /// The bytes of the STL file.
+    /// The bytes of an STL file, for [`slice`].
     pub model: &'a [u8],
     /// What to call the model.
     pub name: &'a str,
@@ -100,21 +101,28 @@ pub fn slice(
     out: &mut dyn Write,
     watch: &mut Watch<'_>,
 ) -> Result<Outcome, Failure> {
+    let name = Path::new(request.name);
+    let model = Model { name, format: Format::Stl, bytes: request.model };
+    slice_all(request, &[model], &Arrangement::default(), out, watch)
+}
+
+/// Slices models of any format, all on one bed and layer by layer together, and writes the program to
+/// `out`.
+///
+/// # Errors
+///
+/// [`Failure`] with what is wrong with models, settings or output.
+pub fn slice_all(
+    request: &Request<'_>,
+    models: &[Model<'_>],
+    arrangement: &Arrangement,
+    out: &mut dyn Write,
+    watch: &mut Watch<'_>,
+) -> Result<Outcome, Failure> {
     let job = request.job;
     let mut clock = Stopwatch::start();
-    watch.progress.stage("read", 1);
-    let (soup, read) = stl::read(request.model).map_err(|e| unusable(e.class(), &e, e.hint()))?;
-    let read_ms = clock.lap();
-    watch.progress.stage("repair", 1);
-    let soup = if request.wish.scale == 1.0 { soup } else { soup.scaled(request.wish.scale) };
-    check_size(&soup, request.job)?;
-    let (solid, health) = solid_from_soup(&soup).map_err(|e| unusable(e.class(), &e, e.hint()))?;
-    let health = health.with_read(&read);
-    drop(soup);
-    let repair_ms = clock.lap();
-    watch.progress.stage("orient", 1);
-    let given = solid.mesh().bounds();
-    let placed = place(solid, &request.wish, &job.orient)?;
+    let Loaded { given, placed, health, read_ms, repair_ms } =
+        load(request, models, arrangement, &mut clock, watch)?;
     let fit = check_envelope(&placed, job)?;
     let mut warnings: Vec<Warning> = health.notes.iter().map(warning).collect();
     warnings.extend(placement_warnings(&given, &placed, fit, job));
@@ -208,14 +216,6 @@ fn time_of(
     Ok(layers(upright, &stages, &job, &mut text, watch)?.totals.time)
 }
 
-fn unusable(class: &'static str, error: &dyn std::error::Error, hint: Option<String>) -> Failure {
-    let failure = Failure::new(class, error.to_string());
-    match hint {
-        Some(hint) => failure.hint(hint),
-        None => failure,
-    }
-}
-
 #[expect(clippy::needless_pass_by_value, reason = "the shape that map_err calls")]
 fn written(error: std::io::Error) -> Failure {
     output::failed(Path::new("program"), &error)
@@ -233,7 +233,7 @@ fn placement_warnings(given: &Bounds, placed: &Placed, fit: Fit, job: &Job) -> V
     };
     // A model that does not stand near the origin was made for another frame.
     let far = given.min.xy().coords.norm().max(given.max.xy().coords.norm());
-    if given.min.z.abs() > RECENTRED_MM || far > job.printer.rail.max {
+    if !given.is_empty() && (given.min.z.abs() > RECENTRED_MM || far > job.printer.rail.max) {
         let shift = placed.placement.shift;
         warn(
             "Recentred",
@@ -326,6 +326,52 @@ fn layers(
         return Err(nothing_to_print(count, job));
     }
     Ok(printed)
+}
+
+/// Models on the bed.
+struct Loaded {
+    /// The box around the only model, as its file has it; empty when there are several, of which
+    /// each lies as if it were alone.
+    given: Bounds,
+    placed: Placed,
+    health: Health,
+    read_ms: f64,
+    repair_ms: f64,
+}
+
+/// Reads and repairs models and puts them on the bed.
+fn load(
+    request: &Request<'_>,
+    models: &[Model<'_>],
+    arrangement: &Arrangement,
+    clock: &mut Stopwatch,
+    watch: &mut Watch<'_>,
+) -> Result<Loaded, Failure> {
+    let (job, wish) = (request.job, request.wish);
+    watch.progress.stage("read", 1);
+    let given = models.iter().map(|model| models::read(model, &wish));
+    let given = given.collect::<Result<Vec<_>, _>>()?;
+    let read_ms = clock.lap();
+    watch.progress.stage("repair", 1);
+    let (mut solids, mut healths) = (Vec::new(), Vec::new());
+    for (model, given) in models.iter().zip(given) {
+        check_size(&given.soup, job)?;
+        let (solid, health) = models::repaired(&given, model.name)?;
+        let is_usual = wish.pose == Pose::Usual;
+        let pose = if is_usual { models::usual_pose(given.objects) } else { wish.pose };
+        solids.push((solid, Wish { pose, ..wish }));
+        healths.push((model.name, health));
+    }
+    let health = models::together(healths, arrangement.copies);
+    let repair_ms = clock.lap();
+    watch.progress.stage("orient", 1);
+    let is_one = solids.len() == 1 && arrangement.copies == 1 && arrangement.at.is_empty();
+    let (given, placed) = if is_one && let Some((solid, wish)) = solids.pop() {
+        (solid.mesh().bounds(), place(solid, &wish, &job.orient)?)
+    } else {
+        (Bounds::default(), models::arrange(solids, arrangement, &job.orient)?)
+    };
+    Ok(Loaded { given, placed, health, read_ms, repair_ms })
 }
 
 /// How a program says which surface the following layers lie on.

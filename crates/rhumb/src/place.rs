@@ -1,6 +1,8 @@
 //! How the model comes to stand on the bed.
 
 use geom::bounding::Bounds;
+use mesh::cut::{Keep, cut};
+use mesh::health::solid_from_soup;
 use mesh::measure;
 use mesh::mesh::Mesh;
 use mesh::orient::{OrientParams, Rest, candidates, laid, rest};
@@ -23,6 +25,8 @@ pub enum Pose {
     Keep,
     /// Turned about x, then y, then z, radians.
     Turned([f64; 3]),
+    /// Flat; of a file whose objects have places with regard to each other, as it is.
+    Usual,
 }
 
 /// Where the user wants the model.
@@ -34,11 +38,24 @@ pub struct Wish {
     pub centre: Point2<f64>,
     /// Millimetres in a unit of the file, times the scale.
     pub scale: f64,
+    /// Along which axes of the file the model is mirrored.
+    pub mirror: [bool; 3],
+    /// How far it is turned about z once it lies, radians.
+    pub turn: f64,
+    /// At which height, mm above the bed, it is cut, and what is kept; the upper part is set down.
+    pub cut: Option<(f64, Keep)>,
 }
 
 impl Default for Wish {
     fn default() -> Self {
-        Self { pose: Pose::Flat, centre: Point2::origin(), scale: 1.0 }
+        Self {
+            pose: Pose::Flat,
+            centre: Point2::origin(),
+            scale: 1.0,
+            mirror: [false; 3],
+            turn: 0.0,
+            cut: None,
+        }
     }
 }
 
@@ -75,9 +92,18 @@ impl Pose {
 ///
 /// `Usage`.
 pub fn parse_centre(text: &str) -> Result<Point2<f64>, Failure> {
+    parse_place("--place", text)
+}
+
+/// Reads the `X,Y` of an option.
+///
+/// # Errors
+///
+/// `Usage`.
+pub fn parse_place(option: &str, text: &str) -> Result<Point2<f64>, Failure> {
     numbers::<2>(text)
         .map(Point2::from)
-        .ok_or_else(|| Failure::new("Usage", format!("--place {text:?} is not X,Y")))
+        .ok_or_else(|| Failure::new("Usage", format!("{option} {text:?} is not X,Y")))
 }
 
 /// `N` finite numbers with commas between them.
@@ -112,7 +138,7 @@ pub struct Placed {
 /// `Usage` for a rank that the list of candidates does not have.
 pub fn place(solid: Solid, wish: &Wish, orient: &OrientParams) -> Result<Placed, Failure> {
     let (rotation, rest) = match wish.pose {
-        Pose::Flat => {
+        Pose::Flat | Pose::Usual => {
             let (rotation, rest) = rest(solid.mesh(), orient);
             (rotation, Some(rest))
         }
@@ -127,8 +153,19 @@ pub fn place(solid: Solid, wish: &Wish, orient: &OrientParams) -> Result<Placed,
         // nalgebra takes roll, pitch and yaw in this very order: about x, then y, then z.
         Pose::Turned([x, y, z]) => (Rotation3::from_euler_angles(x, y, z), None),
     };
+    let rotation = if wish.turn == 0.0 {
+        rotation
+    } else {
+        Rotation3::from_axis_angle(&Vector3::z_axis(), wish.turn) * rotation
+    };
     let mut placement = Placement::on_bed(solid.mesh(), &rotation);
     let mut solid = solid.into_moved(|p| placement.point(p));
+    if let Some((height, keep)) = wish.cut {
+        solid = cut_at(&solid, height, keep)?;
+        let again = Placement::on_bed(solid.mesh(), &Rotation3::identity());
+        placement.shift += again.shift;
+        solid = solid.into_moved(|p| again.point(p));
+    }
     let azimuth = whole_places(reference_azimuth(solid.mesh()));
     if wish.centre != Point2::origin() {
         let aside = Vector3::new(wish.centre.x, wish.centre.y, 0.0);
@@ -139,6 +176,17 @@ pub fn place(solid: Solid, wish: &Wish, orient: &OrientParams) -> Result<Placed,
     Ok(Placed { solid, placement, rest, azimuth, reach })
 }
 
+/// What a cut leaves of a part that stands on the bed.
+fn cut_at(solid: &Solid, height: f64, keep: Keep) -> Result<Solid, Failure> {
+    let soup = cut(solid, height, keep);
+    solid_from_soup(&soup).map(|(solid, _)| solid).map_err(|_| {
+        let tall = solid.mesh().bounds().size().z;
+        let side = if keep == Keep::Lower { "below" } else { "above" };
+        let what = format!("nothing is left {side} --cut {height}; the part is {tall:.3} mm tall");
+        Failure::new("NothingToPrint", what)
+    })
+}
+
 fn no_such_rank(rank: usize, count: usize) -> Failure {
     Failure::new("Usage", format!("--orient {rank}: the model has {count} ways to lie"))
         .hint("rhumb orient lists them")
@@ -146,7 +194,7 @@ fn no_such_rank(rank: usize, count: usize) -> Failure {
 
 /// The nearest angle that a program can say exactly (0.0001°): the program of a part that is turned
 /// by such an angle is then the same but for that angle, rounding included.
-fn whole_places(radians: f64) -> f64 {
+pub(crate) fn whole_places(radians: f64) -> f64 {
     ((radians.to_degrees() * 1e4).round() / 1e4).to_radians()
 }
 
@@ -360,6 +408,35 @@ mod tests {
         assert!(bounds.min.z.abs() < 1e-12);
         assert!((bounds.min.x - 20.0).abs() < 1e-9 && (bounds.max.x - 40.0).abs() < 1e-9);
         assert!((part.reach - 40.0_f64.hypot(10.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_cut_leaves_a_part_that_stands_on_the_bed() {
+        let cut = |height: f64, keep: Keep| {
+            let wish = Wish { pose: Pose::Keep, cut: Some((height, keep)), ..Wish::default() };
+            place(Solid::new(shapes::steps()), &wish, &job().orient)
+        };
+        for (keep, tall) in [(Keep::Lower, 5.0), (Keep::Upper, 10.0)] {
+            let part = cut(5.0, keep).unwrap();
+            let bounds = part.solid.mesh().bounds();
+            assert_eq!((bounds.min.z, bounds.max.z), (0.0, tall));
+            // The first step is lower than the cut, so the upper part is centred anew.
+            assert!((footprint_of(part.solid.mesh()).unwrap().0.coords).norm() < 1e-6);
+        }
+        for (height, keep) in [(0.0, Keep::Lower), (-1.0, Keep::Lower), (15.0, Keep::Upper)] {
+            let nothing = cut(height, keep).map(|_| ()).unwrap_err();
+            assert_eq!(nothing.class(), "NothingToPrint", "{height}");
+        }
+    }
+
+    #[test]
+    fn a_turn_is_about_the_axis_once_the_part_lies() {
+        let turned = |turn: f64| {
+            let wish = Wish { turn, ..Wish::default() };
+            placed(shapes::block(30.0, 20.0, 10.0), &wish).solid.mesh().bounds().size()
+        };
+        let quarter = turned(std::f64::consts::FRAC_PI_2);
+        assert!((quarter - Vector3::new(20.0, 30.0, 10.0)).norm() < 1e-9, "{quarter}");
     }
 
     #[test]

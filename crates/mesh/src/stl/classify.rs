@@ -154,7 +154,11 @@ fn is_text(bytes: &[u8]) -> bool {
 /// What a file begins with, what it is, and what to do with it.
 const SIGNATURES: &[(&[u8], &str, &str)] = &[
     (b"\x1f\x8b", "a gzip archive", UNPACK),
-    (b"PK\x03\x04", "a zip archive, perhaps a 3MF", "export as STL, or unpack the zip first"),
+    (
+        b"PK\x03\x04",
+        "a zip archive, perhaps a 3MF",
+        "a 3MF is read when its name ends in .3mf; unpack another zip first",
+    ),
     (b"7z\xbc\xaf\x27\x1c", "a 7z archive", UNPACK),
     (b"Rar!\x1a\x07", "a RAR archive", UNPACK),
     (b"BZh", "a bzip2 archive", UNPACK),
@@ -195,7 +199,7 @@ fn signature(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
         return None;
     }
     if is_obj(text) {
-        return Some(("an OBJ model", EXPORT));
+        return Some(("an OBJ model", "an OBJ is read when its name ends in .obj"));
     }
     if is_gcode(text) {
         return Some(("G-code", GCODE));

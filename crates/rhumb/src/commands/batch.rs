@@ -29,7 +29,7 @@ use crate::interrupt::Interrupt;
 use crate::settings::{KEYS, Settings};
 
 /// What models are called, in folders.
-const ENDINGS: &[&str] = &["stl"];
+const ENDINGS: &[&str] = &["stl", "3mf", "obj"];
 
 /// The report.
 #[derive(Serialize)]

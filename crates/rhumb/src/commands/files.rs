@@ -31,7 +31,7 @@ impl Files {
         let files = Self::default();
         match command {
             Command::Slice(a) => files
-                .reads([&a.model])
+                .reads(&a.models)
                 .reads_settings(&a.settings)
                 .writes([&slice::target(a)])
                 .writes(a.report.iter().chain(&a.export_placed)),

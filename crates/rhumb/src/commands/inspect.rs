@@ -11,14 +11,14 @@ use super::{DONE, LOOK, display_name, say, say_json};
 use crate::args::{Inspect, Manner};
 use crate::failure::Failure;
 use crate::input;
-use crate::place::volume;
+use crate::place::{Wish, volume};
 
 /// Crossings that are listed; a mesh with more is not mended by knowing all.
 const MOST_CROSSINGS: usize = 1000;
 
 pub(super) fn run(arguments: &Inspect, manner: &Manner) -> Result<u8, Failure> {
     let bytes = input::read(&arguments.model)?;
-    let (solid, health) = super::solid(&arguments.model, &bytes, 1.0)?;
+    let (solid, health) = super::solid(&arguments.model, &bytes, &Wish::default())?;
     let crossings = self_intersections(&solid, MOST_CROSSINGS).len();
     if manner.json {
         say_json(&as_json(&display_name(&arguments.model), &solid, &health, crossings))?;

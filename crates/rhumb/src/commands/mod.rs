@@ -18,14 +18,16 @@ mod verify;
 use std::io::{self, Write};
 use std::path::Path;
 
-use mesh::health::{Health, solid_from_soup};
-use mesh::stl;
+use mesh::cut::Keep;
+use mesh::health::Health;
+use mesh::model::Format;
 use mesh::topology::Solid;
 
-use crate::args::{Arguments, Command, PlaceArguments, SettingsArguments};
+use crate::args::{Arguments, Axis, Command, Part, PlaceArguments, SettingsArguments};
 use crate::calibration::Calibration;
 use crate::failure::Failure;
 use crate::input;
+use crate::models::{self, Model};
 use crate::output::{self, Output};
 use crate::place::{Pose, Wish, parse_centre};
 use crate::settings::{Job, Settings};
@@ -95,18 +97,10 @@ fn settings(arguments: &SettingsArguments) -> Result<(Settings, Job), Failure> {
     Ok((settings, job))
 }
 
-/// Reads the mesh of a file; `scale` multiplies its coordinates.
-fn solid(path: &Path, bytes: &[u8], scale: f64) -> Result<(Solid, Health), Failure> {
-    let unusable = |class, message: String, hint: Option<String>| {
-        let failure = Failure::new(class, message).about(path);
-        hint.map_or(failure.clone(), |hint| failure.hint(hint))
-    };
-    let (soup, read) = stl::read(bytes)
-        .map_err(|error| unusable(error.class(), error.to_string(), error.hint()))?;
-    let soup = if scale == 1.0 { soup } else { soup.scaled(scale) };
-    let (solid, health) = solid_from_soup(&soup)
-        .map_err(|error| unusable(error.class(), error.to_string(), error.hint()))?;
-    Ok((solid, health.with_read(&read)))
+/// Reads the mesh of a file; of the wish, scale and mirrors count.
+fn solid(path: &Path, bytes: &[u8], wish: &Wish) -> Result<(Solid, Health), Failure> {
+    let model = Model { name: path, format: Format::of(path, bytes), bytes };
+    models::repaired(&models::read(&model, wish)?, path)
 }
 
 fn wish(arguments: &PlaceArguments) -> Result<Wish, Failure> {
@@ -114,10 +108,26 @@ fn wish(arguments: &PlaceArguments) -> Result<Wish, Failure> {
     if !(scale.is_finite() && scale > 0.0) {
         return Err(Failure::new("Usage", format!("--scale {} is not above 0", arguments.scale)));
     }
+    let turns = [arguments.rotate_x, arguments.rotate_y, arguments.rotate_z];
+    let heights = arguments.cut.into_iter();
+    if let Some(odd) = turns.into_iter().chain(heights).find(|number| !number.is_finite()) {
+        return Err(Failure::new("Usage", format!("{odd} is neither an angle nor a height")));
+    }
+    let [x, y, z] = turns.map(f64::to_radians);
+    let pose = match &arguments.orient {
+        Some(text) => Pose::parse(text)?,
+        None if x != 0.0 || y != 0.0 => Pose::Turned([x, y, 0.0]),
+        None => Pose::Usual,
+    };
+    let is_along = |axis| arguments.mirror.contains(&axis);
+    let keep = if arguments.keep == Part::Upper { Keep::Upper } else { Keep::Lower };
     Ok(Wish {
-        pose: Pose::parse(&arguments.orient)?,
+        pose,
         centre: parse_centre(&arguments.place)?,
         scale,
+        mirror: [Axis::X, Axis::Y, Axis::Z].map(is_along),
+        turn: z,
+        cut: arguments.cut.map(|height| (height, keep)),
     })
 }
 

@@ -29,7 +29,7 @@ pub(super) fn run(arguments: &Orient, manner: &Manner) -> Result<u8, Failure> {
     let (_, job) = settings(&arguments.settings)?;
     let wish = wish(&arguments.place)?;
     let bytes = input::read(&arguments.model)?;
-    let (solid, _) = super::solid(&arguments.model, &bytes, wish.scale)?;
+    let (solid, _) = super::solid(&arguments.model, &bytes, &wish)?;
     if let Some(target) = &arguments.output {
         let placed = place(solid.clone(), &wish, &job.orient)?;
         write_file(target, &[&arguments.model], &stl::write(placed.solid.mesh()))?;

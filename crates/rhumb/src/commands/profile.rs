@@ -1,13 +1,14 @@
 //! `rhumb profile`: settings and where they come from.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::{DONE, say, say_json};
+use super::{DONE, display_name, say, say_json, write_file};
 use crate::args::{Manner, Profile, SettingsArguments};
 use crate::failure::Failure;
 use crate::input;
 use crate::settings::merge::BUILT_IN;
+use crate::settings::prusa::{self, Imported};
 use crate::settings::{Job, KEYS, Section, Settings, Sources};
 
 pub(super) fn run(profile: &Profile, manner: &Manner) -> Result<u8, Failure> {
@@ -15,7 +16,69 @@ pub(super) fn run(profile: &Profile, manner: &Manner) -> Result<u8, Failure> {
         Profile::List => list(),
         Profile::Show { name, settings } => show(name.as_deref(), settings, manner),
         Profile::Check { file } => check(file),
+        Profile::Import { file, output } => import(file, output.as_deref(), manner),
     }
+}
+
+/// Takes over settings of PrusaSlicer, and says which it could not.
+fn import(file: &Path, output: Option<&Path>, manner: &Manner) -> Result<u8, Failure> {
+    let name = display_name(file);
+    let imported = prusa::read(&input::read(file)?, &name)?;
+    let stem = file.file_stem().filter(|_| file != Path::new("-")).unwrap_or("prusa".as_ref());
+    let base = output.map_or_else(|| stem.to_owned(), |path| path.as_os_str().to_owned());
+    let mut written = Vec::new();
+    for section in [Section::Print, Section::Material] {
+        let Some(text) = imported.toml(section, &name) else { continue };
+        let mut target = base.clone();
+        target.push(format!(".{}.toml", section.word()));
+        let target = PathBuf::from(target);
+        write_file(&target, &[file], text.as_bytes())?;
+        written.push((section, target.display().to_string()));
+    }
+    if manner.json {
+        let taken: serde_json::Map<String, serde_json::Value> = imported
+            .taken
+            .iter()
+            .map(|(key, value)| (key.name.to_owned(), value.to_string().into()))
+            .collect();
+        let refused: Vec<_> = imported
+            .refused
+            .iter()
+            .map(|(key, value, why)| serde_json::json!({"key": key, "value": value, "why": why}))
+            .collect();
+        let files: Vec<&String> = written.iter().map(|(_, file)| file).collect();
+        say_json(&serde_json::json!({
+            "written": files, "taken": taken, "refused": refused, "unknown": imported.unknown,
+        }))?;
+    } else {
+        say(&import_text(&imported, &written))?;
+    }
+    Ok(DONE)
+}
+
+fn import_text(imported: &Imported, written: &[(Section, String)]) -> String {
+    let mut out = String::new();
+    // Writing to a string cannot fail.
+    for (section, file) in written {
+        let keys: Vec<_> =
+            imported.taken.iter().filter(|(key, _)| key.section == *section).collect();
+        let _ = writeln!(out, "{file}: {} settings, for --{} {file}", keys.len(), section.word());
+        for (key, value) in keys {
+            let _ = writeln!(out, "  {} = {value}", key.name);
+        }
+    }
+    if !imported.refused.is_empty() {
+        let _ = writeln!(out, "not taken over, for their values:");
+        for (key, value, why) in &imported.refused {
+            let value: String = value.chars().take(60).collect();
+            let _ = writeln!(out, "  {key} = {value}: {why}");
+        }
+    }
+    if !imported.unknown.is_empty() {
+        let _ = writeln!(out, "not taken over, having no counterpart:");
+        let _ = writeln!(out, "  {}", imported.unknown.join(", "));
+    }
+    out
 }
 
 fn list() -> Result<u8, Failure> {

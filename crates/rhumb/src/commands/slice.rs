@@ -3,6 +3,7 @@
 use std::io::{BufReader, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
+use mesh::model::Format;
 use slicer::level::Snap;
 use twin::verify::Verdict;
 
@@ -14,8 +15,10 @@ use crate::clock;
 use crate::failure::Failure;
 use crate::input;
 use crate::interrupt::Interrupt;
+use crate::models::{Arrangement, Model};
 use crate::output::{self, Output};
 use crate::pipeline::{self, Outcome, Request, Watch};
+use crate::place::parse_place;
 use crate::progress::{Bars, Progress, Silent};
 use crate::report::Report;
 use crate::settings::Job;
@@ -33,9 +36,10 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     let (settings, mut job) = settings(&wanted)?;
     job.most_cuts = arguments.effort.most_cuts * 1e6;
     let wish = wish(&arguments.place)?;
+    let arrangement = arrangement(arguments)?;
     let target = target(arguments);
-    let model = input::read(&arguments.model)?;
-    let inputs = [arguments.model.as_path()];
+    let inputs: Vec<&Path> = arguments.models.iter().map(PathBuf::as_path).collect();
+    let bytes = inputs.iter().map(|path| input::read(path)).collect::<Result<Vec<_>, _>>()?;
     let mut out = Output::create(&target, &inputs)?;
     let beside = |path: &Option<PathBuf>| path.as_deref().map(|p| Output::create(p, &inputs));
     let report_file = beside(&arguments.report).transpose()?;
@@ -46,11 +50,16 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     } else {
         Box::new(Bars::default())
     };
-    let name = display_name(&arguments.model);
+    let models: Vec<Model> = inputs
+        .iter()
+        .zip(&bytes)
+        .map(|(name, bytes)| Model { name, format: Format::of(name, bytes), bytes })
+        .collect();
+    let name = names(&inputs);
     let mut outcome = {
         let mut text = BufWriter::with_capacity(1 << 16, out.file());
         let request = Request {
-            model: &model,
+            model: &[],
             name: &name,
             wish,
             settings: &settings,
@@ -58,13 +67,13 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
             made_at: &clock::now(),
         };
         let watch = &mut Watch { progress: &mut *progress, interrupt: &interrupt };
-        let mut outcome = pipeline::slice(&request, &mut text, watch)
-            .map_err(|failure| about_model(failure, &arguments.model))?;
+        let mut outcome = pipeline::slice_all(&request, &models, &arrangement, &mut text, watch)
+            .map_err(|failure| about_model(failure, &inputs))?;
         outcome.warnings.extend(calibration::warning(&job.printer));
         text.flush().map_err(|error| output::failed(&target, &error))?;
         outcome
     };
-    drop(model);
+    drop(bytes);
     let verdict = if arguments.effort.no_verify {
         None
     } else {
@@ -99,7 +108,8 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
 /// Where the program goes: `MODEL.gcode` in the working folder unless the user says.
 pub(super) fn target(arguments: &Slice) -> PathBuf {
     arguments.output.clone().unwrap_or_else(|| {
-        let stem = arguments.model.file_stem().filter(|_| arguments.model != Path::new("-"));
+        let first = arguments.models.first().filter(|name| *name != Path::new("-"));
+        let stem = first.and_then(|name| name.file_stem());
         let mut name = stem.unwrap_or("model".as_ref()).to_owned();
         name.push(".gcode");
         PathBuf::from(name)
@@ -107,8 +117,41 @@ pub(super) fn target(arguments: &Slice) -> PathBuf {
 }
 
 /// What is wrong with a model names it; other failures name what they are about.
-fn about_model(failure: Failure, model: &Path) -> Failure {
-    if matches!(failure.exit_status(), 4 | 5 | 8) { failure.about(model) } else { failure }
+fn about_model(failure: Failure, models: &[&Path]) -> Failure {
+    match models {
+        [model] if matches!(failure.exit_status(), 4 | 5 | 8) => failure.about(model),
+        _ => failure,
+    }
+}
+
+/// The names of the models, for people.
+fn names(models: &[&Path]) -> String {
+    match models {
+        [] => String::new(),
+        [model] => display_name(model),
+        [model, others @ ..] => format!("{} and {} more", display_name(model), others.len()),
+    }
+}
+
+/// Where several models are to stand.
+fn arrangement(arguments: &Slice) -> Result<Arrangement, Failure> {
+    let copies = usize::from(arguments.copies);
+    let at = arguments.at.iter().map(|text| parse_place("--at", text));
+    let at = at.collect::<Result<Vec<_>, _>>()?;
+    let wanted = copies * arguments.models.len();
+    if !at.is_empty() && at.len() != wanted {
+        let what = format!("--at is given {} times for {wanted} parts", at.len());
+        return Err(Failure::new("Usage", what));
+    }
+    let gap = arguments.gap;
+    if !(gap.is_finite() && gap >= 0.0) {
+        return Err(Failure::new("Usage", format!("--gap {gap} is below 0")));
+    }
+    let n_inputs = arguments.models.iter().filter(|name| *name == Path::new("-")).count();
+    if n_inputs > 1 {
+        return Err(Failure::new("Usage", "standard input holds one model".to_owned()));
+    }
+    Ok(Arrangement { at, gap, copies })
 }
 
 fn fill(mut file: Output, bytes: &[u8]) -> Result<(), Failure> {

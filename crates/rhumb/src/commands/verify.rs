@@ -14,6 +14,7 @@ use crate::calibration::Calibration;
 use crate::check::{check, findings};
 use crate::failure::Failure;
 use crate::input;
+use crate::place::Wish;
 use crate::program_text::duration;
 use crate::settings::Job;
 
@@ -209,6 +210,6 @@ fn setting_at_end(program: &[u8], name: &str) -> Option<String> {
 /// Reads a mesh that was sliced.
 pub(super) fn part(path: &Path) -> Result<mesh::mesh::Mesh, Failure> {
     let bytes = input::read(path)?;
-    let (solid, _) = super::solid(path, &bytes, 1.0)?;
+    let (solid, _) = super::solid(path, &bytes, &Wish::default())?;
     Ok(solid.into_mesh())
 }

@@ -11,6 +11,7 @@ pub mod file;
 pub mod key;
 pub mod merge;
 pub mod page;
+pub mod prusa;
 pub mod resolve;
 pub mod template;
 
