@@ -734,6 +734,7 @@ M84
 ; cusp_area_share = 0%
 ; perimeters = 2
 ; external_perimeters_first = 0
+; avoid_crossing_perimeters = 0
 ; only_one_perimeter_top = 0
 ; extra_perimeters = 0
 ; seam_position = nearest
