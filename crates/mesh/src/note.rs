@@ -15,6 +15,8 @@ pub const MISSING_ENDSOLID: &str = "MissingEndsolid";
 pub const NORMALS_IGNORED: &str = "NormalsIgnored";
 /// The name of the solid held line ends or control characters.
 pub const NAME_SANITIZED: &str = "NameSanitized";
+/// Volumes of a model that are no part of its shape are left out.
+pub const VOLUMES_LEFT_OUT: &str = "VolumesLeftOut";
 /// Settings of another slicer that come with a model are not taken over.
 pub const EMBEDDED_SETTINGS_IGNORED: &str = "EmbeddedSettingsIgnored";
 /// Vertices on open seams were joined within the weld tolerance.

@@ -41,7 +41,7 @@ use crate::stopwatch::Stopwatch;
 
 /// What to slice and how.
 pub struct Request<'a> {
-    /// The bytes of an STL file, for [`slice`].
+    /// The bytes of an STL file, for [`slice()`].
     pub model: &'a [u8],
     /// What to call the model.
     pub name: &'a str,

@@ -7,6 +7,7 @@
 //! entities and nothing is fetched; what the package holds for other programs is not looked at.
 
 mod part;
+mod volumes;
 
 use super::archive::Archive;
 use super::{Given, ModelError, facet};
@@ -14,6 +15,7 @@ use crate::note::{self, Note};
 use crate::soup::Soup;
 use part::{Component, Object, Part, Shape, Transform};
 use std::collections::BTreeMap;
+use volumes::LeftOut;
 
 /// Where the model of a package is, unless its relationships say otherwise.
 const USUAL: &str = "3D/3dmodel.model";
@@ -29,7 +31,8 @@ const MOST_FACETS: usize = 20_000_000;
 pub(super) fn read(bytes: &[u8]) -> Result<Given, ModelError> {
     let archive = Archive::of(bytes).map_err(malformed)?;
     let root = part::root(&archive)?.unwrap_or_else(|| USUAL.to_owned());
-    let mut package = Package { archive, parts: BTreeMap::new() };
+    let left_out = LeftOut::of(&archive);
+    let mut package = Package { archive, parts: BTreeMap::new(), left_out };
     package.load(&root)?;
     let build = package.parts[&root].build.clone();
     let mut placed = Placed { most: MOST_FACETS.max(package.n_facets()), ..Placed::default() };
@@ -50,6 +53,7 @@ fn malformed(what: impl Into<String>) -> ModelError {
 struct Package<'a> {
     archive: Archive<'a>,
     parts: BTreeMap<String, Part>,
+    left_out: LeftOut,
 }
 
 /// What is placed so far.
@@ -108,9 +112,14 @@ impl Package<'_> {
         }
         let to_build = place.then(to_build);
         match &object.shape {
-            Shape::Mesh(mesh) => mesh_at(mesh, &to_build.of_unit(here.mm), id, placed),
+            Shape::Mesh(mesh) => {
+                // Runs are of the objects that the build places.
+                let left_out = Some(&self.left_out).filter(|_| depth == 0);
+                mesh_at(mesh, &to_build.of_unit(here.mm), id, left_out, placed)
+            }
             Shape::Components(components) => {
-                let components = components.clone();
+                let mut components = components.clone();
+                components.retain(|c| !self.left_out.has_component(id, c.object));
                 components.iter().try_for_each(|component| {
                     self.place(part, component, &to_build, depth + 1, placed)
                 })
@@ -126,6 +135,11 @@ impl Package<'_> {
             let what = "the name of an object holds line ends or other control characters; names of \
                         objects are not used";
             notes.push(Note::new(note::NAME_SANITIZED, what.to_owned()));
+        }
+        if !self.left_out.is_empty() {
+            let what = "volumes that change settings, take material away or are for supports are \
+                        left out";
+            notes.push(Note::new(note::VOLUMES_LEFT_OUT, what.to_owned()));
         }
         let is_settings = |name: &[u8]| {
             let name = name.to_ascii_lowercase();
@@ -148,6 +162,7 @@ fn mesh_at(
     mesh: &part::Mesh,
     to_build: &Transform,
     id: u32,
+    left_out: Option<&LeftOut>,
     placed: &mut Placed,
 ) -> Result<(), ModelError> {
     if placed.soup.facets.len() + mesh.triangles.len() > placed.most {
@@ -159,7 +174,10 @@ fn mesh_at(
     }
     let is_mirrored = to_build.determinant() < 0.0;
     placed.soup.facets.reserve(mesh.triangles.len());
-    for (number, &[a, b, c]) in (1..).zip(&mesh.triangles) {
+    for (number, &[a, b, c]) in mesh.triangles.iter().enumerate() {
+        if left_out.is_some_and(|left_out| left_out.has_triangle(id, number)) {
+            continue;
+        }
         let [b, c] = if is_mirrored { [c, b] } else { [b, c] };
         let corners = [a, b, c].map(|v| to_build.point(&mesh.vertices[v as usize]));
         let place = || format!("object {id}, triangle {number}");

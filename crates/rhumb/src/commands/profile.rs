@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::{DONE, display_name, say, say_json, write_file};
+use super::{DONE, LOOK, display_name, say, say_json, write_file};
 use crate::args::{Manner, Profile, SettingsArguments};
 use crate::failure::Failure;
 use crate::input;
@@ -35,6 +35,7 @@ fn import(file: &Path, output: Option<&Path>, manner: &Manner) -> Result<u8, Fai
         write_file(&target, &[file], text.as_bytes())?;
         written.push((section, target.display().to_string()));
     }
+    let conflict = conflict(&written);
     if manner.json {
         let taken: serde_json::Map<String, serde_json::Value> = imported
             .taken
@@ -49,11 +50,29 @@ fn import(file: &Path, output: Option<&Path>, manner: &Manner) -> Result<u8, Fai
         let files: Vec<&String> = written.iter().map(|(_, file)| file).collect();
         say_json(&serde_json::json!({
             "written": files, "taken": taken, "refused": refused, "unknown": imported.unknown,
+            "conflict": conflict.as_ref().map(ToString::to_string),
         }))?;
     } else {
         say(&import_text(&imported, &written))?;
+        if let Some(conflict) = &conflict {
+            say(&format!("with our other settings as they are: {conflict}\n"))?;
+        }
     }
-    Ok(DONE)
+    Ok(if conflict.is_some() { LOOK } else { DONE })
+}
+
+/// What keeps new profiles from being used together with our defaults.
+fn conflict(written: &[(Section, String)]) -> Option<Failure> {
+    let file = |wanted| {
+        let file = written.iter().find(|(section, _)| *section == wanted);
+        file.map(|(_, file)| Path::new(".").join(file).to_string_lossy().into_owned())
+    };
+    let sources = Sources {
+        print: file(Section::Print),
+        material: file(Section::Material),
+        ..Sources::default()
+    };
+    Settings::load(&sources, &input::read).and_then(|settings| Job::resolve(&settings)).err()
 }
 
 fn import_text(imported: &Imported, written: &[(Section, String)]) -> String {
@@ -68,7 +87,7 @@ fn import_text(imported: &Imported, written: &[(Section, String)]) -> String {
         }
     }
     if !imported.refused.is_empty() {
-        let _ = writeln!(out, "not taken over, for their values:");
+        let _ = writeln!(out, "not taken over, for their values; ours stay as they are:");
         for (key, value, why) in &imported.refused {
             let value: String = value.chars().take(60).collect();
             let _ = writeln!(out, "  {key} = {value}: {why}");

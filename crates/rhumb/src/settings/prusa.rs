@@ -33,6 +33,10 @@ const OTHER_NAMES: [(&str, &str); 8] = [
     ("initial_layer_height", "first_layer_height_mm"),
 ];
 
+/// Keys that stand at the end of our programs, too, but mean something else there: how coarse the
+/// lines of a program are is not how coarse outlines are.
+const OTHER_MEANINGS: [&str; 1] = ["gcode_resolution"];
+
 /// What a percentage is of; of itself, the other names say.
 const SHARES_OF: [(&str, &str); 11] = [
     ("first_layer_height", "layer_height"),
@@ -127,7 +131,7 @@ fn counterpart(written: &str) -> Option<(usize, &'static Key)> {
     KEYS.iter().enumerate().find(|(_, key)| {
         let is_it = match other {
             Some(other) => key.name == other,
-            None => key.program_name == written,
+            None => key.program_name == written && !OTHER_MEANINGS.contains(&written),
         };
         is_it && key.section != Section::Printer
     })
@@ -144,7 +148,10 @@ fn value(
     let told = |text: &str| from_text(key, text, name).map_err(|failure| why(&failure, name));
     match key.kind {
         Kind::Number(..) | Kind::Count(..) => {
-            let number = number(given, written, 0).ok_or("it is no number here")?;
+            let number = number(given, written, 0).ok_or_else(|| match first(raw) {
+                "0" => "PrusaSlicer works it out of the nozzle".to_owned(),
+                _ => "it is no number here".to_owned(),
+            })?;
             told(&number.to_string())
         }
         // Fans run at so many per cent, without a sign for it.
@@ -228,7 +235,7 @@ mod tests {
         filament_retract_length = 1.4\nfilament_retract_lift = nil\nmax_fan_speed = 50\n\
         external_perimeters_first = 1\nfilament_max_volumetric_speed = 0\n\
         nozzle_diameter = 0.4\nstart_gcode = G28 ; home = all\nbrim_type = no_brim\nbrim_width = 5\n\
-        wipe_tower = 1\n";
+        wipe_tower = 1\ngcode_resolution = 0.0125\n";
 
     #[test]
     fn settings_are_taken_over() {
@@ -269,6 +276,7 @@ mod tests {
         // Every line is in one of the three lists, but for what another key overrides.
         let n_lines = EXPORTED.lines().filter(|line| line.contains(" = ")).count();
         let n_listed = imported.taken.len() + imported.refused.len() + imported.unknown.len();
+        assert!(taken(&imported, "simplify_mm").is_none());
         let silent = ["retract_length", "filament_retract_lift"].len();
         assert_eq!(n_listed + silent, n_lines);
     }

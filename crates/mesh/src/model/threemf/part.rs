@@ -129,7 +129,7 @@ pub(super) fn read(member: Member) -> Result<Part, ModelError> {
 }
 
 /// Calls `each` with the start of every element, and again at its end when it is not empty.
-fn each_element(
+pub(super) fn each_element(
     member: Member,
     mut each: impl FnMut(&BytesStart, bool) -> Result<(), ModelError>,
 ) -> Result<(), ModelError> {
@@ -318,7 +318,7 @@ fn attributes<'a>(
 }
 
 /// An attribute as text, references to characters resolved; there are no other entities.
-fn text(element: &BytesStart, name: &[u8]) -> Result<Option<String>, ModelError> {
+pub(super) fn text(element: &BytesStart, name: &[u8]) -> Result<Option<String>, ModelError> {
     for attribute in attributes(element) {
         let attribute = attribute?;
         if attribute.key.local_name().as_ref() == name {
@@ -331,7 +331,7 @@ fn text(element: &BytesStart, name: &[u8]) -> Result<Option<String>, ModelError>
     Ok(None)
 }
 
-fn integer(element: &BytesStart, name: &[u8]) -> Result<u32, ModelError> {
+pub(super) fn integer(element: &BytesStart, name: &[u8]) -> Result<u32, ModelError> {
     let value = text(element, name)?.unwrap_or_default();
     value.trim().parse().map_err(|_| {
         let (name, value) = (String::from_utf8_lossy(name), shown(value.as_bytes()));

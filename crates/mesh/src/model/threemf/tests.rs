@@ -174,3 +174,36 @@ fn small_files_do_not_become_large_models() {
     let blanks = " ".repeat(40 << 20);
     assert_eq!(class(&packed(&model("", &(blanks + &cube(1, "")), &build(1)))), "LimitExceeded");
 }
+
+#[test]
+fn modifiers_are_no_part_of_the_shape() {
+    let text = model("", &cube(1, ""), "<item objectid=\"1\"/>");
+    let volumes = |kind: &str| {
+        format!(
+            "<config><object id=\"1\"><metadata type=\"object\" key=\"name\" value=\"a\"/>\
+             <volume firstid=\"0\" lastid=\"3\"><metadata type=\"volume\" key=\"volume_type\" \
+             value=\"ModelPart\"/></volume><volume firstid=\"4\" lastid=\"11\"><metadata \
+             type=\"volume\" key=\"volume_type\" value=\"{kind}\"/></volume></object></config>"
+        )
+    };
+    let facets = |config: &str| {
+        let members: [(&str, &[u8]); 2] =
+            [(USUAL, text.as_bytes()), ("Metadata/Slic3r_PE_model.config", config.as_bytes())];
+        let given = read(&zip(&members)).unwrap();
+        let is_told = given.notes.iter().any(|n| n.code == note::VOLUMES_LEFT_OUT);
+        (given.soup.facets.len(), is_told)
+    };
+    assert_eq!(facets(&volumes("ModelPart")), (12, false));
+    assert_eq!(facets(&volumes("ParameterModifier")), (4, true));
+    assert_eq!(facets(&volumes("NegativeVolume")), (4, true));
+    assert_eq!(facets("<config><object"), (12, false), "what cannot be read leaves nothing out");
+    // The same in the manner of slices with a file for each object.
+    let both = "<object id=\"5\"><components><component objectid=\"1\"/><component objectid=\"2\"/>\
+                </components></object>";
+    let text = model("", &(cube(1, "") + &cube(2, "") + both), "<item objectid=\"5\"/>");
+    let config = "<config><object id=\"5\"><part id=\"1\" subtype=\"normal_part\"/><part id=\"2\" \
+                  subtype=\"modifier_part\"/></object></config>";
+    let members: [(&str, &[u8]); 2] =
+        [(USUAL, text.as_bytes()), ("Metadata/model_settings.config", config.as_bytes())];
+    assert_eq!(read(&zip(&members)).unwrap().soup.facets.len(), 12);
+}
