@@ -160,6 +160,12 @@ fn models_stand_where_they_are_wanted() {
     assert_eq!(placed(&scratch), [[-35.0, -5.0, 0.0], [25.0, 15.0, 6.0]]);
     let refused = scratch.run(&["slice", "a.stl", "a.stl", "--at", "0,0"]).expect(2);
     assert!(refused.err.contains("1 times for 2 parts"), "{}", refused.err);
+    // Parts in one place are told, those that touch are not.
+    let told = |places: [&str; 2]| {
+        let at = ["a.stl", "a.stl", "--orient", "keep", "--at", places[0], "--at", places[1]];
+        report(&scratch, &at)["warnings"].to_string().contains("ModelsOverlap")
+    };
+    assert!(told(["0,0", "4,5"]) && !told(["0,0", "10,0"]));
     let many = report(&scratch, &["a.stl", "--copies", "7", "--gap", "1"]);
     assert_eq!(many["mesh"]["shells"], 7);
     let far: Ran = scratch.run(&["slice", "a.stl", "a.stl", "--at", "0,0", "--at", "200,0"]);

@@ -6,6 +6,7 @@
 
 use std::path::Path;
 
+use geom::bounding::Bounds;
 use geom::circle::{Circle, smallest_around};
 use mesh::health::{Health, solid_from_soup};
 use mesh::mesh::Mesh;
@@ -100,7 +101,8 @@ fn unusable(class: &'static str, error: &dyn std::error::Error, hint: Option<Str
 }
 
 /// Lays several solids down, each as is wished, and puts them on the bed together, as one solid. The
-/// place that is wished for the first is that of the middle of all.
+/// place that is wished for the first is that of the middle of all. Two that overlap as far as their
+/// boxes tell are told, counted from 1.
 ///
 /// # Errors
 ///
@@ -109,7 +111,7 @@ pub fn arrange(
     solids: Vec<(Solid, Wish)>,
     arrangement: &Arrangement,
     orient: &OrientParams,
-) -> Result<Placed, Failure> {
+) -> Result<(Placed, Option<[usize; 2]>), Failure> {
     let mut parts = Vec::new();
     let aside = solids.first().map_or(Point2::origin(), |(_, wish)| wish.centre);
     for (solid, wish) in solids {
@@ -123,17 +125,31 @@ pub fn arrange(
         arrangement.at.clone()
     };
     let mut all = Mesh::default();
+    let mut boxes = Vec::with_capacity(parts.len());
     for ((part, _), centre) in parts.into_iter().zip(centres) {
         let first = all.vertices.len() as u32;
         let aside = Vector3::new(centre.x + aside.x, centre.y + aside.y, 0.0);
         let mesh = part.into_mesh();
         all.vertices.extend(mesh.vertices.iter().map(|p| p + aside));
+        boxes.push(Bounds::of(&all.vertices[first as usize..]));
         all.triangles.extend(mesh.triangles.iter().map(|corners| corners.map(|v| v + first)));
     }
     let azimuth = whole_places(reference_azimuth(&all));
     let reach = all.vertices.iter().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
     let placement = Placement { rotation: Rotation3::identity(), shift: Vector3::zeros() };
-    Ok(Placed { solid: Solid::new(all), placement, rest: None, azimuth, reach })
+    let placed = Placed { solid: Solid::new(all), placement, rest: None, azimuth, reach };
+    Ok((placed, overlapping(&boxes)))
+}
+
+/// Two parts, counted from 1, of which each reaches into the box around the other.
+fn overlapping(boxes: &[Bounds]) -> Option<[usize; 2]> {
+    let overlap = |a: &Bounds, b: &Bounds| {
+        (0..3).all(|k| a.min[k] < b.max[k] - TOUCHING_MM && b.min[k] < a.max[k] - TOUCHING_MM)
+    };
+    boxes.iter().enumerate().find_map(|(j, b)| {
+        let i = boxes[..j].iter().position(|a| overlap(a, b))?;
+        Some([i + 1, j + 1])
+    })
 }
 
 /// The pose of models for which the user wants none: flat, but objects that have places with regard
@@ -174,7 +190,7 @@ pub fn together(mut each: Vec<(&Path, Health)>, copies: usize) -> Health {
     all
 }
 
-/// Two circles that are nearer than the gap by less than this touch, mm: rounding.
+/// What is nearer than it should be by less than this touches, mm: rounding.
 const TOUCHING_MM: f64 = 1e-9;
 
 /// The centres of circles that stay a gap apart, packed about the origin.

@@ -121,11 +121,15 @@ pub fn slice_all(
 ) -> Result<Outcome, Failure> {
     let job = request.job;
     let mut clock = Stopwatch::start();
-    let Loaded { given, placed, health, read_ms, repair_ms } =
+    let Loaded { given, placed, overlap, health, read_ms, repair_ms } =
         load(request, models, arrangement, &mut clock, watch)?;
     let fit = check_envelope(&placed, job)?;
     let mut warnings: Vec<Warning> = health.notes.iter().map(warning).collect();
     warnings.extend(placement_warnings(&given, &placed, fit, job));
+    warnings.extend(overlap.map(|[a, b]| Warning {
+        code: "ModelsOverlap".to_owned(),
+        message: format!("parts {a} and {b} overlap where they stand, as far as their boxes tell"),
+    }));
     let orient_ms = clock.lap();
 
     // The slicer works in a frame that turns with the part, so that its choices do too.
@@ -334,6 +338,8 @@ struct Loaded {
     /// each lies as if it were alone.
     given: Bounds,
     placed: Placed,
+    /// Two of several models that overlap.
+    overlap: Option<[usize; 2]>,
     health: Health,
     read_ms: f64,
     repair_ms: f64,
@@ -366,12 +372,12 @@ fn load(
     let repair_ms = clock.lap();
     watch.progress.stage("orient", 1);
     let is_one = solids.len() == 1 && arrangement.copies == 1 && arrangement.at.is_empty();
-    let (given, placed) = if is_one && let Some((solid, wish)) = solids.pop() {
-        (solid.mesh().bounds(), place(solid, &wish, &job.orient)?)
+    let (given, (placed, overlap)) = if is_one && let Some((solid, wish)) = solids.pop() {
+        (solid.mesh().bounds(), (place(solid, &wish, &job.orient)?, None))
     } else {
         (Bounds::default(), models::arrange(solids, arrangement, &job.orient)?)
     };
-    Ok(Loaded { given, placed, health, read_ms, repair_ms })
+    Ok(Loaded { given, placed, overlap, health, read_ms, repair_ms })
 }
 
 /// How a program says which surface the following layers lie on.
