@@ -103,7 +103,8 @@ fn settings_of_prusaslicer_become_profiles() {
     scratch.file("mine.ini", exported);
     let ran = scratch.run(&["profile", "import", "mine.ini"]).expect(0);
     assert_eq!(scratch.names(), ["mine.ini", "mine.material.toml", "mine.print.toml"]);
-    for told in ["perimeters = 4", "fill_pattern = hilbertcurve", "nozzle_diameter", "one of rectilinear"]
+    for told in
+        ["perimeters = 4", "fill_pattern = hilbertcurve", "nozzle_diameter", "one of rectilinear"]
     {
         assert!(ran.out.contains(told), "{told}: {}", ran.out);
     }
