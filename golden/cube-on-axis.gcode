@@ -654,6 +654,7 @@ M84
 ; retract_before_travel = 2
 ; retract_lift = 0.2
 ; wipe_distance = 0
+; pressure_advance = 0
 ; fan_speed = 100%
 ; bridge_fan_speed = 100%
 ; disable_fan_first_layers = 1

@@ -371,3 +371,29 @@ fn slow_flow_beside_the_axis_is_told_and_there_is_none_elsewhere() {
     let (_, totals) = sliced(&solid, &settings, &job);
     assert_eq!(totals.slow_flow.places, 0);
 }
+
+#[test]
+fn filament_ahead_of_its_flow_is_told_in_the_words_of_each_firmware() {
+    for (printer, wanted) in [
+        ("klipper-polar", "SET_PRESSURE_ADVANCE ADVANCE=0.045"),
+        ("rrf-polar", "M572 D0 S0.045"),
+        ("core-r-theta", "M572 D0 S0.045"),
+        ("marlin-polar", "M900 K0.045"),
+    ] {
+        let (settings, job) = job(printer, &["pressure_advance_s=0.045"]);
+        flawless(&bar(20.0, 0.6), [0.0; 2], &settings, &job);
+        let text = String::from_utf8(program(&bar(20.0, 0.6), &settings, &job)).expect("ASCII");
+        let line = text.lines().position(|line| line == wanted).expect("it is told");
+        let laid = text.lines().position(|line| line.starts_with(";TYPE:")).expect("a bead");
+        assert!(line < laid, "{printer}: before the print");
+    }
+    let sources = Sources {
+        printer: Some("grblhal-polar".into()),
+        set: vec!["pressure_advance_s=0.045".into()],
+        ..Sources::default()
+    };
+    let no_files = |_: &std::path::Path| unreachable!("built-in profiles need no files");
+    let settings = Settings::load(&sources, &no_files).expect("the value is in its range");
+    let refused = Job::resolve(&settings).expect_err("grblHAL has no such command");
+    assert!(refused.to_string().contains("pressure_advance_s"), "{refused}");
+}

@@ -7,7 +7,7 @@
 use nalgebra::Point3;
 
 use super::marlin::Marlin;
-use super::number::{quantum, value};
+use super::number::{decimal, quantum, value};
 use super::speed_word::{SpeedWord, Way};
 use crate::profile::Printer;
 use crate::program::{BedTurn, Joints, Move};
@@ -162,6 +162,19 @@ impl Dialect {
         Way { path, words: x.hypot(y).hypot(rise), filament, turn, ends, rise }
     }
 
+    /// Returns the command that makes the firmware push filament ahead of its flow by so many seconds of
+    /// its speed (pressure advance, linear advance); `None` where no firmware of this dialect has one.
+    #[must_use]
+    pub fn pressure_advance(&self, seconds: f64) -> Option<String> {
+        let value = decimal(seconds, 4);
+        match self.name {
+            "klipper-polar" => Some(format!("SET_PRESSURE_ADVANCE ADVANCE={value}")),
+            "rrf-polar" | "rrf-direct" => Some(format!("M572 D0 S{value}")),
+            "marlin-polar" => Some(format!("M900 K{value}")),
+            _ => None,
+        }
+    }
+
     /// Returns whether `G92` may set the count of this word: the bed's, where it is kept short.
     #[must_use]
     pub fn recounts(&self, letter: u8) -> bool {
@@ -283,6 +296,21 @@ pub(super) const DEGREE_DECIMALS: usize = 4;
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pressure_advance_is_said_as_each_firmware_knows_it() {
+        let said = ALL.map(|dialect| dialect.pressure_advance(0.045));
+        let known: Vec<String> = said.into_iter().flatten().collect();
+        assert_eq!(
+            known,
+            [
+                "M572 D0 S0.045",
+                "SET_PRESSURE_ADVANCE ADVANCE=0.045",
+                "M572 D0 S0.045",
+                "M900 K0.045"
+            ]
+        );
+    }
 
     #[test]
     fn names_are_found_again() {

@@ -679,6 +679,14 @@ pub const KEYS: &[Key] = &[
         (0.0, 0.0, 50.0),
         "how far the nozzle runs back along the line while the filament is drawn back",
     ),
+    number(
+        Material,
+        "pressure_advance_s",
+        "pressure_advance",
+        (0.0, 0.0, 2.0),
+        "filament pushed ahead of its flow, for each mm/s of its speed; told to the firmware before the \
+         print, 0 leaves it as it is",
+    ),
     share(Material, "fan_speed", 1.0, "part fan"),
     share(
         Material,

@@ -151,7 +151,7 @@ impl Job {
                 inertia: get.number("bed_inertia_kg_m2"),
             },
             most_cuts: MOST_CUTS,
-            start: template::fill(get.text("start_gcode"), "start_gcode", settings)?,
+            start: start(&get, &dialect, settings)?,
             end: template::fill(get.text("end_gcode"), "end_gcode", settings)?,
             printer,
             dialect,
@@ -471,6 +471,19 @@ fn solid_pattern(word: &str) -> SolidPattern {
         "archimedeanchords" => SolidPattern::Archimedean,
         _ => SolidPattern::Rectilinear,
     }
+}
+
+/// The start program, and after it how far filament is pushed ahead of its flow.
+fn start(get: &Lookup<'_>, dialect: &Dialect, settings: &Settings) -> Result<Vec<String>, Failure> {
+    let mut lines = template::fill(get.text("start_gcode"), "start_gcode", settings)?;
+    let advance = get.number("pressure_advance_s");
+    if advance > 0.0 {
+        lines.push(dialect.pressure_advance(advance).ok_or_else(|| {
+            conflict("pressure_advance_s: no command for it is known in dialect", dialect.name)
+                .hint("put the firmware's own command into start_gcode")
+        })?);
+    }
+    Ok(lines)
 }
 
 /// How far combed travel keeps from outlines, as a share of the width of the outermost bead.

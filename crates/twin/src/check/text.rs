@@ -24,8 +24,12 @@ pub const FILAMENT_ALONE: f64 = 50.0;
 const GENERAL: [u32; 7] = [4, 21, 28, 90, 92, 93, 94];
 
 /// The `M` commands that a program may have: extruder relative (83), motors off (18, 84), heaters
-/// and fans, progress and messages (73, 117), waiting for moves to end (400).
-const MACHINE: [u32; 12] = [18, 73, 83, 84, 104, 106, 107, 109, 117, 140, 190, 400];
+/// and fans, progress and messages (73, 117), waiting for moves to end (400), filament ahead of its flow
+/// (572, 900).
+const MACHINE: [u32; 14] = [18, 73, 83, 84, 104, 106, 107, 109, 117, 140, 190, 400, 572, 900];
+
+/// The commands by name that a program may have: Klipper's own, which move nothing.
+const NAMED: [&str; 2] = ["SET_PRESSURE_ADVANCE", "SET_PRINT_STATS_INFO"];
 
 /// Judges lines as they stand.
 #[derive(Debug, Clone, Copy)]
@@ -123,6 +127,7 @@ impl Text {
                     format!("{}{number}{part} is not on the list of safe commands", letter as char)
                 });
             }
+            Code::Named(name) if NAMED.contains(&name.split(' ').next().unwrap_or_default()) => {}
             // A macro of the printer's owner: nobody here can know what it does.
             Code::Named(name) => findings.warning(NAME, place, (1.0, 0.0), || {
                 format!("what the macro {} does cannot be judged", printable(name))
