@@ -1,6 +1,7 @@
 //! The kinematics against published numbers, where the folder with the vectors is at hand.
 
 use machine::backlash::Backlash;
+use machine::drive::{Drive, Transmission};
 use machine::gcode::speed_word::{SpeedWord, Way};
 use machine::height_map::HeightMap;
 use machine::kinematics::{Alignment, BedScale, Branch};
@@ -205,5 +206,59 @@ fn inverse_time_words() {
         let way = Way { path: length, words: length, filament: 0.0, turn, ends, rise };
         let word = SpeedWord::InverseTime.word(&way, number(case, "T"));
         assert!((word - number(case, "F_G93")).abs() < 1e-9, "{case}: {word}");
+    }
+}
+
+#[test]
+fn speeds_and_accelerations_past_the_axis_are_those_of_the_theory() {
+    let Some(all) = vectors("calibration.json") else { return };
+    // Central differences of the inverse over 1e-4 mm: short against the nearest line of 0.25 mm.
+    let step = 1e-4;
+    for case in all["line_dynamics"].as_array().unwrap() {
+        let (d, speed) = (number(case, "d"), number(case, "v"));
+        let joints = |y: f64| {
+            let part = Point3::new(d, y, 0.0);
+            Alignment::IDEAL.joints_from_part(&part, Branch::Near, BedTurn::default()).unwrap()
+        };
+        let rates = |y: f64| {
+            let [low, here, high] = [y - step, y, y + step].map(joints);
+            let of = |axis: fn(&Joints) -> f64| {
+                let first = (axis(&high) - axis(&low)) / (2.0 * step) * speed;
+                let second = axis(&high) - 2.0 * axis(&here) + axis(&low);
+                [first, second / (step * step) * speed * speed]
+            };
+            [of(|joints| joints.turn.radians()), of(|joints| joints.s)]
+        };
+        let [[omega, alpha], [rail_v, rail_a]] = rates(number(case, "y"));
+        let worst = rates(d / 3.0_f64.sqrt())[0][1].abs();
+        for (name, value) in [
+            ("omega", omega),
+            ("alpha", alpha),
+            ("rail_v", rail_v),
+            ("rail_a", rail_a),
+            ("alpha_max", worst),
+        ] {
+            let wanted = number(case, name);
+            assert!((value - wanted).abs() < 1e-4 * (1.0 + wanted.abs()), "{name} {value} {case}");
+        }
+    }
+}
+
+#[test]
+fn a_whole_step_is_off_by_what_the_gears_say() {
+    let Some(all) = vectors("calibration.json") else { return };
+    for case in all["quantisation"].as_array().unwrap() {
+        let drive = Drive {
+            motor_steps: number(case, "full_steps") as u32,
+            microsteps: number(case, "microsteps") as u32,
+            gear_ratio: number(case, "gear"),
+            transmission: Transmission::Shaft,
+        };
+        assert!((drive.step() - number(case, "theta_step")).abs() < 1e-15, "{case}");
+        let arc = drive.step() * number(case, "r");
+        assert!((1e3 * arc - number(case, "arc_um")).abs() < 1e-9, "{case}");
+        // Half a step of both axes at once.
+        let worst = 0.5 * arc.hypot(number(case, "rail_step"));
+        assert!((1e3 * worst - number(case, "worst_um")).abs() < 1e-9, "{case}");
     }
 }

@@ -177,3 +177,28 @@ fn the_stepwise_procedure_takes_longer_and_knows_less() {
     assert!(fast.is_ok());
     assert!(quick.n_moves() * 5 < rig.n_moves(), "{} {}", quick.n_moves(), rig.n_moves());
 }
+
+#[test]
+fn the_field_of_a_magnet_is_that_of_the_published_numbers() {
+    let manifest = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let shared = manifest.ancestors().nth(3).map(|dir| dir.join("shared/vectors/calibration.json"));
+    let Some(text) = shared.and_then(|path| std::fs::read_to_string(path).ok()) else { return };
+    let all: serde_json::Value = serde_json::from_str(&text).expect("the vectors are JSON");
+    let mut seen = 0;
+    for case in all["hall_field"].as_array().expect("a list") {
+        if case["kind"] != "cylinder" {
+            continue;
+        }
+        let number = |key: &str| case[key].as_f64().expect("a number");
+        let magnet = Cylinder {
+            radius: number("radius"),
+            length: number("length"),
+            remanence: number("Br"),
+        };
+        let field = magnet.field(number("gap"), number("rho"));
+        let wanted = number("Bz");
+        assert!((field - wanted).abs() < 1e-4 * wanted, "{field} {case}");
+        seen += 1;
+    }
+    assert!(seen >= 5);
+}
