@@ -254,3 +254,33 @@ fn layers_are_chosen_by_what_hangs_over() {
     assert!(area(1) < 0.2 * area(0), "{}", layers["weighed"]);
     assert!(layers["weighed"]["why"].as_str().unwrap().contains("unsupported"));
 }
+
+#[test]
+fn a_vase_is_one_line_that_climbs() {
+    for layers in [&["--layers", "planar"][..], &["--layers", "conical", "--cone-angle=-15"]] {
+        let mut arguments = vec!["--set", "spiral_vase=true", "--set", "skirts=0"];
+        arguments.extend(["--set", "bottom_solid_layers=3", "--set", "nozzle_flat_radius_mm=0.2"]);
+        arguments.extend(layers);
+        let text = sliced(&mesh::shapes::vase(64), &arguments);
+        let all = motions(&text);
+        // From the first turn on material flows without a break and the bed turns one way.
+        let first = text.lines().position(|line| line == "; spiral vase").unwrap();
+        let begin = all.iter().position(|m| m.line > first && m.lays()).unwrap();
+        let end = all.iter().rposition(Motion::lays).unwrap();
+        let climbing = &all[begin..=end];
+        let turns = climbing.last().unwrap().layer.unwrap() - climbing[0].layer.unwrap() + 1;
+        assert!(turns > 50, "{layers:?}: {turns}");
+        let idle: f64 = climbing.iter().filter(|m| !m.lays()).map(Motion::path).sum();
+        assert!(idle < 0.02 * turns as f64, "{layers:?}: {idle} mm without material");
+        assert!(climbing.iter().all(|m| m.e >= 0.0), "nothing is drawn back");
+        let turned = (climbing.last().unwrap().to[1] - climbing[0].from[1]).abs() / 360.0;
+        assert!((turned / turns as f64 - 1.0).abs() < 0.05, "{layers:?}: {turned} of {turns}");
+        let sign = (climbing.last().unwrap().to[1] - climbing[0].from[1]).signum();
+        let back = climbing.iter().filter(|m| sign * (m.to[1] - m.from[1]) < -0.5).count();
+        assert_eq!(back, 0, "{layers:?}");
+        if layers[1] == "planar" {
+            let falls = climbing.iter().filter(|m| m.to[2] < m.from[2] - 1e-3).count();
+            assert_eq!(falls, 0);
+        }
+    }
+}

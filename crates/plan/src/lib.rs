@@ -13,6 +13,7 @@ pub mod axis;
 mod comb;
 pub mod cooling;
 pub mod follow;
+pub mod helix;
 pub mod order;
 pub mod planner;
 pub mod printed;

@@ -304,7 +304,7 @@ fn leave_out_short(stations: &mut Vec<Station>, tolerance: f64) {
 }
 
 /// A closed line begun at the place on it nearest to `target`, on a side if need be.
-fn begun_near(path: &Toolpath, target: &Point2<f64>) -> OrderedLine {
+pub(crate) fn begun_near(path: &Toolpath, target: &Point2<f64>) -> OrderedLine {
     let points = plane(path);
     let place = nearest_on_ring(&points, target).expect("lines have points");
     for corner in [place.side, (place.side + 1) % points.len()] {

@@ -7,6 +7,7 @@ use nalgebra::{Point2, Point3};
 use slicer::toolpath::LayerPaths;
 
 use crate::cooling::{CoolingParams, slow_down};
+use crate::helix::Helix;
 use crate::order::{OrderParams, order};
 use crate::printed::Printed;
 use crate::resample::{Leg, ResampleParams, Resampler};
@@ -99,6 +100,9 @@ pub struct PlanError {
     pub source: Unreachable,
 }
 
+/// How a program says that the following layer climbs in one turn.
+const CLIMBS: &str = "spiral vase";
+
 /// Plans layer after layer. See the [module](self).
 pub struct Planner<'a> {
     printer: &'a Printer,
@@ -107,6 +111,7 @@ pub struct Planner<'a> {
     resampler: Resampler,
     router: Router,
     seams: SeamMemory,
+    helix: Helix,
     pace: Pace,
     totals: Totals,
     flow: FlowWatch,
@@ -129,6 +134,7 @@ impl<'a> Planner<'a> {
             router: Router::new(resampler.at(), printer.lift.speed, printed),
             resampler,
             seams: SeamMemory::default(),
+            helix: Helix::default(),
             pace: Pace::REST,
             totals: Totals::default(),
             flow: FlowWatch::new(params.filament.least_flow, params.filament.area),
@@ -143,10 +149,18 @@ impl<'a> Planner<'a> {
     /// [`PlanError`] where a line comes nearer to the axis than the rail can.
     pub fn layer(&mut self, layer: &LayerPaths) -> Result<Vec<Step>, PlanError> {
         let nozzle = self.begin_at();
-        let lines = order(layer, nozzle, &mut self.seams, &self.params.order);
+        let turn = self.helix.turn(layer, nozzle);
+        let climbs = turn.is_some();
+        let lines = match turn {
+            Some(turn) => vec![turn],
+            None => order(layer, nozzle, &mut self.seams, &self.params.order),
+        };
         let items = self.router.layer(layer, &lines, &self.params.speeds, &self.params.filament);
         let items = self.with_bridge_fan(items, layer.index);
         let mut steps = self.heat(layer.index);
+        if climbs {
+            steps.push(Step::Remark(CLIMBS.into()));
+        }
         let planned =
             self.lower(items).map_err(|source| PlanError { layer: layer.index, source })?;
         steps.extend(planned);

@@ -19,10 +19,12 @@ pub struct CompensationParams {
 }
 
 impl CompensationParams {
-    /// Returns how far any outline moves at most, either way.
+    /// Returns how far outlines move at most: more than zero when any moves outwards, less when all
+    /// move inwards.
     #[must_use]
     pub fn greatest(&self) -> f64 {
-        self.all.abs() + self.holes.abs().max(self.first_layer)
+        let by = self.all.abs() + self.holes.abs().max(self.first_layer);
+        if self.all > 0.0 || self.holes < 0.0 { by } else { -by }
     }
 }
 
@@ -58,6 +60,8 @@ fn keeping_thin(region: &Region, chart: &Chart, distance: f64) -> Region {
     let inset = chart.inset(region, distance);
     let thick = chart.opened(region, distance + KEPT_MM / 2.0);
     let thin = region.difference(&chart.outset(&thick, distance));
+    // An opening cuts corners off; those are no thin places.
+    let thin = chart.opened(&thin, KEPT_MM / 4.0);
     if thin.is_empty() { inset } else { inset.union(&thin) }
 }
 

@@ -28,8 +28,9 @@ pub fn roughened(
     let seed = (layer as u64) << 40 ^ (first.x * 1e3).to_bits() ^ (first.y * 1e3).to_bits() << 7;
     let mut random = Random(seed);
     let mut rough = Vec::new();
-    // The way left to the next point.
+    // The way left to the next point, and how deep the last one lies.
     let mut left = params.step * random.next();
+    let mut depth = 0.0;
     for (k, (from, bead)) in line.iter().enumerate() {
         let (to, to_bead) = &line[(k + 1) % line.len()];
         let side = to - from;
@@ -45,11 +46,17 @@ pub fn roughened(
                 width: bead.width + (to_bead.width - bead.width) * share,
                 thickness: bead.thickness + (to_bead.thickness - bead.thickness) * share,
             };
-            rough.push((from + side * share + inwards * (params.depth * random.next()), bead));
+            depth = params.depth * random.next();
+            rough.push((from + side * share + inwards * depth, bead));
             // Half to one and a half steps.
             along += params.step * (0.5 + random.next());
         }
         left = along - length;
+        // A side of the wall would cut a hollow corner, outside of the part.
+        let next = line[(k + 2) % line.len()].0;
+        if side.perp(&(next - to)) < 0.0 {
+            rough.push((to + inwards * depth, *to_bead));
+        }
     }
     // A line too short for it stays as it is.
     if rough.len() < 3 { line.to_vec() } else { rough }
@@ -71,6 +78,25 @@ impl Random {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn hollow_corners_are_not_cut() {
+        // The outline of a hole: the material is outside of it.
+        let bead = Bead { width: 0.45, thickness: 0.2 };
+        let corners = [[0.0, 0.0], [0.0, 6.0], [6.0, 6.0], [6.0, 0.0]];
+        let line = corners.map(|p| (Point2::from(p), bead));
+        for layer in 1..40 {
+            let rough = roughened(&line, layer, &FuzzyParams { depth: 0.3, step: 0.8 });
+            for (k, (a, _)) in rough.iter().enumerate() {
+                let (b, _) = rough[(k + 1) % rough.len()];
+                for share in [0.0, 0.25, 0.5, 0.75] {
+                    let p = a + (b - a) * share;
+                    let inside = p.x.min(p.y).min(6.0 - p.x).min(6.0 - p.y);
+                    assert!(inside < 1e-9, "{p} is {inside} mm inside of the hole");
+                }
+            }
+        }
+    }
 
     #[test]
     fn a_wall_becomes_rough_within_its_depth() {

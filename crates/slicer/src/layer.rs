@@ -38,6 +38,8 @@ pub struct PathParams {
     pub compensation: CompensationParams,
     /// How rough outer walls are, if they are.
     pub fuzzy: Option<FuzzyParams>,
+    /// Whether there is a single climbing wall above the bottom.
+    pub vase: bool,
     /// How far simplified lines may lie from their course, mm.
     pub tolerance: f64,
 }
@@ -71,6 +73,9 @@ pub fn fill_layer(
     params: &PathParams,
 ) -> Filled {
     let frame = Frame::of(lift);
+    if params.vase && is_above_the_bottom(lift, material, params) {
+        return vase_layer(material, &frame, params);
+    }
     let islands: Vec<(IslandPaths, LostArea)> = material
         .islands()
         .par_iter()
@@ -107,6 +112,48 @@ pub fn fill_layer(
             .collect();
     }
     filled
+}
+
+/// Whether a layer of a vase is none of its solid bottom, and nowhere ends on the flat layers that
+/// curved ones begin on.
+fn is_above_the_bottom(lift: &Lift<'_>, material: &Region, params: &PathParams) -> bool {
+    let is_free = |floor: f64| {
+        let thickness = lift.level.thickness();
+        let mut outline = material.rings().flatten().map(|&p| lift.point(&mm(p)));
+        outline.all(|at| at.z > floor + 2.0 * thickness)
+    };
+    lift.level.index >= params.skins.bottom_layers && lift.floor.is_none_or(is_free)
+}
+
+/// The outer walls of a layer and nothing else.
+fn vase_layer(material: &Region, frame: &Frame<'_>, params: &PathParams) -> Filled {
+    let wanted = WallParams { count: 1, ..params.walls };
+    let islands = material.islands().iter().filter_map(|island| {
+        let outline = Region::from_island(vec![island.first()?.clone()]);
+        let found = walls(&outline, &frame.chart, frame.thickness, &wanted);
+        let groups = found.groups.iter().map(|group| WallGroup {
+            loops: group
+                .iter()
+                .map(|wall| Toolpath {
+                    role: Role::ExternalPerimeter,
+                    closed: true,
+                    stations: frame.lift.stations(&wall.points, true),
+                })
+                .collect(),
+        });
+        let outline = frame.seen_from_above(outline);
+        Some(IslandPaths { walls: groups.collect(), outline, ..IslandPaths::default() })
+    });
+    let level = &frame.lift.level;
+    let mut paths = LayerPaths {
+        index: level.index,
+        upper: level.upper,
+        thickness: frame.thickness,
+        islands: islands.collect(),
+        ..LayerPaths::default()
+    };
+    paths.rise = paths.only_wall().is_some().then(|| level.thickness());
+    Filled { paths, ..Filled::default() }
 }
 
 /// What a layer stands on: the islands of the layer below, each with the box around it, so that of

@@ -149,9 +149,21 @@ pub struct LayerPaths {
     pub islands: Vec<IslandPaths>,
     /// What could not be filled.
     pub lost: LostArea,
+    /// How far the only wall climbs in its turn, mm, where the layer is one of a spiral vase.
+    pub rise: Option<f64>,
 }
 
 impl LayerPaths {
+    /// Returns the wall of a layer that has a single one and nothing else.
+    #[must_use]
+    pub fn only_wall(&self) -> Option<&Toolpath> {
+        let [island] = self.islands.as_slice() else { return None };
+        let mut loops = island.walls.iter().flat_map(|group| &group.loops);
+        let wall = loops.next()?;
+        let is_alone = loops.next().is_none() && island.all_fills().next().is_none();
+        (is_alone && self.adhesion.is_empty()).then_some(wall)
+    }
+
     /// Returns whether nothing is laid.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -59,7 +59,12 @@ pub struct LayerMark {
     pub height: Option<f64>,
     /// The surfaces that it belongs to, when they were announced; they are planar otherwise.
     pub family: Option<Family>,
+    /// Whether it was announced to climb by its thickness in one turn.
+    pub climbs: bool,
 }
+
+/// How a comment says that the next layer climbs.
+const CLIMBS: &str = " spiral vase";
 
 /// A temperature commanded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,6 +105,7 @@ pub struct Replay {
     top: Option<f64>,
     height: Option<f64>,
     family: Option<Family>,
+    climbs: bool,
     role: Role,
     width: f64,
 }
@@ -122,6 +128,7 @@ impl Replay {
             top: None,
             height: None,
             family: None,
+            climbs: false,
             role: Role::Custom,
             width: 0.0,
         }
@@ -327,7 +334,10 @@ impl Replay {
         } else if let Some(index) = comment.strip_prefix("LAYER:").and_then(|n| n.parse().ok()) {
             self.layer = Some(index);
             let Self { line, top, height, family, .. } = *self;
-            return Event::Layer(LayerMark { line, index, top, height, family });
+            let climbs = std::mem::take(&mut self.climbs);
+            return Event::Layer(LayerMark { line, index, top, height, family, climbs });
+        } else if comment == CLIMBS {
+            self.climbs = true;
         } else if let Some(family) = Family::from_comment(comment) {
             self.family = Some(family);
         }
@@ -434,7 +444,14 @@ mod tests {
         assert_eq!(replay.line("M117 Layer 3: R12 T"), Ok(Event::Nothing));
         assert_eq!(replay.line("G28"), Ok(Event::Rest));
         assert_eq!(replay.line(";Z:0.4"), Ok(Event::Nothing));
-        let mark = LayerMark { line: 6, index: 7, top: Some(0.4), height: None, family: None };
+        let mark = LayerMark {
+            line: 6,
+            index: 7,
+            top: Some(0.4),
+            height: None,
+            family: None,
+            climbs: false,
+        };
         assert_eq!(replay.line(";LAYER:7"), Ok(Event::Layer(mark)));
         assert!(replay.line("G1 R").is_err());
         assert_eq!((replay.lines(), replay.layer()), (7, Some(7)));

@@ -67,7 +67,8 @@ pub struct Setup<'a> {
     pub volume_per_second: f64,
     /// The part as it was placed, in the frame of the part.
     pub mesh: Option<&'a Mesh>,
-    /// How far outlines lie from those of the mesh on purpose, mm.
+    /// How far outlines lie from those of the mesh on purpose, mm: more than zero when any lies
+    /// outside, less when all lie inside.
     pub moved: f64,
     /// Whether the print is meant to be solid.
     pub solid: bool,
@@ -164,7 +165,7 @@ impl<'a> Verifier<'a> {
             heat: Heat::new(printer),
             surface: Surface::new(printer),
             flow: Flow::new(printer, meant, setup.volume_per_second / setup.multiplier),
-            volume: Volume::new(meant, printer.nozzle_diameter).moved(setup.moved),
+            volume: Volume::new(meant, printer.nozzle_diameter).moved(setup.moved.abs()),
             deposit: Deposit::new(printer, meant, setup.coarse).moved(setup.moved),
             watch: setup.thorough.then(|| Watch::new(&setup)),
             part: mesh.map(Part::new),

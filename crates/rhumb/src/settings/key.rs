@@ -846,6 +846,15 @@ pub const KEYS: &[Key] = &[
         meaning: "whether steep overhangs get up to four more walls, so that no infill begins in \
                   mid-air",
     },
+    Key {
+        name: "spiral_vase",
+        section: Print,
+        kind: Kind::Switch,
+        default: Default::Switch(false),
+        program_name: "spiral_vase",
+        meaning: "whether above bottom_solid_layers a single wall climbs without a break: one turn \
+                  of the bed a layer, no infill, no top",
+    },
     choice(
         Print,
         "seam_position",

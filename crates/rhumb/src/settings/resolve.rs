@@ -116,6 +116,7 @@ impl Job {
             .map_err(|error| Failure::new("ConfigConflict", error.to_string()))?;
         check_printer(&printer)?;
         check_layers(&get)?;
+        check_vase(&get)?;
         Ok(Self {
             orient: OrientParams {
                 class_tolerance_rad: get.number("flat_angle_deg").to_radians(),
@@ -331,6 +332,15 @@ fn check_layers(get: &Lookup<'_>) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Turns of a vase go over into each other where layers are alike.
+fn check_vase(get: &Lookup<'_>) -> Result<(), Failure> {
+    let kind = get.text("layers");
+    if !get.switch("spiral_vase") || ["planar", "conical", "caps"].contains(&kind) {
+        return Ok(());
+    }
+    Err(conflict("spiral_vase climbs on layers that are all alike (planar, conical, caps)", kind))
+}
+
 const WIDTHS: [&str; 5] = [
     "external_perimeter_extrusion_width_mm",
     "perimeter_extrusion_width_mm",
@@ -444,6 +454,7 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
             depth: get.number("fuzzy_skin_thickness_mm"),
             step: get.number("fuzzy_skin_point_dist_mm"),
         }),
+        vase: get.switch("spiral_vase"),
         tolerance: tolerances.simplify_mm(),
     }
 }

@@ -274,7 +274,7 @@ mod tests {
             let (mut check, mut findings) = (Continuity::default(), Findings::default());
             for &(index, top) in marks {
                 check.layer(
-                    LayerMark { line: 1, index, top, height: None, family: None },
+                    LayerMark { line: 1, index, top, height: None, family: None, climbs: false },
                     &mut findings,
                 );
             }

@@ -8,7 +8,7 @@
 //! angles, where a µm across is many along the layer. Less than a layer's thickness is a warning
 //! there. A bounded number of segments of each layer is looked at, spread evenly over the layer: when there
 //! are too many, every other one is dropped and only every second, fourth, eighth … is taken from
-//! then on. Planar layers in which the nozzle leaves its plane are not judged. mm, part frame.
+//! then on. Prints whose outlines are moved outwards on purpose are not judged, nor planar layers in which the nozzle leaves its plane are not judged. mm, part frame.
 
 use machine::kinematics::Alignment;
 use machine::profile::Printer;
@@ -80,8 +80,8 @@ pub(crate) struct Deposit {
     family: Family,
     alignment: Alignment,
     filament_area: f64,
-    /// How far outlines lie from those of the mesh on purpose, mm.
-    moved: f64,
+    /// Whether outlines lie outside of those of the mesh on purpose: nothing is judged then.
+    is_grown: bool,
     top: f64,
     /// Half the thickness of the layer, mm.
     half_height: f64,
@@ -101,10 +101,10 @@ impl Deposit {
         Self { alignment: printer.alignment, filament_area, coarse, ..Self::default() }
     }
 
-    /// Allows for outlines that are moved by as much on purpose, mm.
+    /// Allows for outlines that are moved on purpose, outwards when that is more than zero.
     #[must_use]
     pub(crate) fn moved(self, by: f64) -> Self {
-        Self { moved: by, ..self }
+        Self { is_grown: by > 0.0, ..self }
     }
 
     /// Begins a layer.
@@ -115,14 +115,13 @@ impl Deposit {
         self.family = mark.family.unwrap_or_default();
         self.half_height = mark.height.unwrap_or_default() / 2.0;
         self.half_of_last = self.half_height;
-        self.is_sound = mark.top.is_some() && mark.height.is_some();
+        self.is_sound =
+            mark.top.is_some() && mark.height.is_some() && !mark.climbs && !self.is_grown;
     }
 
     pub(crate) fn segment(&mut self, segment: &Segment) {
         // Walls that hang over are outer ones, or lie inside of one.
         let is_outer = matches!(segment.role, Role::ExternalPerimeter | Role::OverhangPerimeter);
-        // Of a bead that was moved by half its width nothing need lie within the mesh.
-        let is_outer = is_outer && segment.width > 2.0 * self.moved;
         if !is_outer || !segment.extrudes() || !self.is_sound {
             return;
         }
@@ -274,7 +273,7 @@ mod tests {
     use crate::section::tests::block;
 
     fn mark(index: usize, top: f64, family: Option<Family>) -> LayerMark {
-        LayerMark { line: 1, index, top: Some(top), height: Some(0.2), family }
+        LayerMark { line: 1, index, top: Some(top), height: Some(0.2), family, climbs: false }
     }
 
     /// A wall along x at this y in a block of 20 mm with a hole of 8 mm, in pieces.

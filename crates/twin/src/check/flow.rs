@@ -119,6 +119,8 @@ impl Flow {
             + (area(segment.width + WIDTH, height) / announced - 1.0);
         let is_planar = mark.family.unwrap_or_default() == Family::Planar;
         let [least, most] = match self.ground {
+            // The first turn of a vase begins without thickness.
+            _ if mark.climbs => [0.0, THICKEST],
             _ if !is_planar => [THINNEST, THICKEST],
             Some(ground) => {
                 [THINNEST, THICKEST / ground.normal(&segment.middle(&self.alignment)).z]
@@ -139,9 +141,9 @@ impl Flow {
         }
         // The width that ironing is announced with is rounded by a tenth of it.
         let is_told = segment.role != Role::Ironing;
+        let is_told_plane = is_planar && self.ground.is_none() && !mark.climbs;
         let role = Role::ALL.iter().position(|role| *role == segment.role && is_told);
-        if let Some(role) = role.filter(|_| is_planar && self.ground.is_none() && share.is_finite())
-        {
+        if let Some(role) = role.filter(|_| is_told_plane && share.is_finite()) {
             let class = (share.min(THICKEST) / CLASS) as usize;
             let classes = &mut self.classes[role];
             if classes.len() <= class {
@@ -202,7 +204,14 @@ mod tests {
         let printer = Printer { axis_clearance: 0.02, ..printer() };
         let (mut check, mut findings) =
             (Flow::new(&printer, 2.0, f64::INFINITY), Findings::default());
-        check.layer(LayerMark { line: 1, index: 0, top: None, height: Some(0.2), family });
+        check.layer(LayerMark {
+            line: 1,
+            index: 0,
+            top: None,
+            height: Some(0.2),
+            family,
+            climbs: false,
+        });
         for k in 0..110 {
             let at = |x: f64| Point3::new(x, 5.0 + f64::from(k), 0.2);
             let mut segment = part_segment(at(0.0), at(20.0));

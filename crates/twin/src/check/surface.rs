@@ -104,6 +104,10 @@ impl Surface {
         let Some(level) = median(&self.samples) else { return };
         let severity = if mark.family.is_some() { Severity::Error } else { Severity::Warning };
         let family = mark.family.unwrap_or_default();
+        if mark.climbs {
+            self.turn(&mark, severity, findings);
+            return;
+        }
         for sample in &self.samples {
             let off = (sample.level - level).abs() * family.thickness_per_level(&sample.at);
             if exceeds(off, OFF) {
@@ -122,6 +126,23 @@ impl Surface {
         }
         self.step(&mark, level, severity, findings);
         self.last = Some((family, level));
+    }
+
+    /// Judges a layer that climbs in one turn: it takes the height of one layer.
+    fn turn(&mut self, mark: &LayerMark, severity: Severity, findings: &mut Findings) {
+        let family = mark.family.unwrap_or_default();
+        let by_level = |a: &&Sample, b: &&Sample| a.level.total_cmp(&b.level);
+        let Some(low) = self.samples.iter().min_by(by_level) else { return };
+        let Some(high) = self.samples.iter().max_by(by_level) else { return };
+        let climbs = (high.level - low.level) * family.thickness_per_level(&high.at);
+        let limit = mark.height.unwrap_or_default() + OFF;
+        if exceeds(climbs, limit) {
+            let place = Place { line: high.line, layer: Some(mark.index), at: Some(high.at) };
+            findings.add(NAME, severity, place, (climbs, limit), || {
+                format!("a turn climbs by {climbs:.3} mm, at most {limit:.3} mm")
+            });
+        }
+        self.last = Some((family, high.level));
     }
 
     /// Judges how far the layer lies above the one before.
@@ -177,7 +198,14 @@ mod tests {
     fn found(family: Option<Family>, levels: &[f64], raised: f64) -> (Vec<f64>, f64) {
         let (mut check, mut findings) = (Surface::new(&printer()), Findings::default());
         for (index, &level) in levels.iter().enumerate() {
-            let mark = LayerMark { line: 10 * index, index, top: None, height: Some(0.2), family };
+            let mark = LayerMark {
+                line: 10 * index,
+                index,
+                top: None,
+                height: Some(0.2),
+                family,
+                climbs: false,
+            };
             check.layer(mark);
             for k in 0..4 {
                 let is_raised = index + 1 == levels.len() && k == 2;
@@ -242,7 +270,14 @@ mod tests {
         // Caps of a sphere of 5 mm do not reach 12 mm out.
         let family = Some(Family::Caps { radius: 5.0 });
         let (mut check, mut findings) = (Surface::new(&printer()), Findings::default());
-        check.layer(LayerMark { line: 1, index: 0, top: None, height: None, family });
+        check.layer(LayerMark {
+            line: 1,
+            index: 0,
+            top: None,
+            height: None,
+            family,
+            climbs: false,
+        });
         let mut segment = part_segment(Point3::new(12.0, 0.0, 0.2), Point3::new(12.5, 0.0, 0.2));
         (segment.filament, segment.role) = (0.1, Role::Perimeter);
         check.segment(&segment);

@@ -298,7 +298,14 @@ mod tests {
         for (index, share) in shares.into_iter().enumerate() {
             let top = HEIGHT * (index + 1) as f64;
             let (top_mark, height) = (Some(top), Some(HEIGHT));
-            let mark = LayerMark { line: index + 1, index, top: top_mark, height, family: None };
+            let mark = LayerMark {
+                line: index + 1,
+                index,
+                top: top_mark,
+                height,
+                family: None,
+                climbs: false,
+            };
             check.layer(mark, Some(&section_at(top - HEIGHT / 2.0)));
             let mut line = segment(joints(5.0, 0.0, top), joints(9.0, 1.0, top), 20.0);
             (line.filament, line.role) = (share * 400.0 * HEIGHT / 2.0, role);
@@ -328,7 +335,14 @@ mod tests {
         line.filament = 0.5;
         line.role = Role::Custom;
         check.segment(&line);
-        let mark = LayerMark { line: 1, index: 0, top: Some(0.2), height: None, family: None };
+        let mark = LayerMark {
+            line: 1,
+            index: 0,
+            top: Some(0.2),
+            height: None,
+            family: None,
+            climbs: false,
+        };
         check.layer(mark, None);
         line.role = Role::Perimeter;
         check.segment(&line);
@@ -353,7 +367,14 @@ mod tests {
         );
         let small = Enclosed { volume: 1.0, surface: 6.0 };
         assert!(check.end(Some(|| small), true, &mut findings).unwrap().contains("no layers"));
-        let mark = LayerMark { line: 4, index: 0, top: Some(1.0), height: Some(1.0), family: None };
+        let mark = LayerMark {
+            line: 4,
+            index: 0,
+            top: Some(1.0),
+            height: Some(1.0),
+            family: None,
+            climbs: false,
+        };
         check.layer(mark, Some(&section_at(0.5)));
         let mut rising = segment(joints(5.0, 0.0, 0.5), joints(9.0, 1.0, 1.0), 20.0);
         rising.filament = 200.0;
