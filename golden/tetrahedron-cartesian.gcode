@@ -738,6 +738,7 @@ M84
 ; avoid_crossing_perimeters = 0
 ; only_one_perimeter_top = 0
 ; extra_perimeters = 0
+; spiral_vase = 0
 ; seam_position = nearest
 ; seam_angle = 90
 ; external_perimeter_extrusion_width = 0.45

@@ -284,3 +284,35 @@ fn a_vase_is_one_line_that_climbs() {
         }
     }
 }
+
+#[test]
+fn thin_walls_are_laid_and_the_share_is_told() {
+    let report = |mesh: &Mesh| -> serde_json::Value {
+        let scratch = Scratch::new();
+        scratch.file("m.stl", mesh::stl::write(mesh));
+        let arguments = ["slice", "m.stl", "-o", "x.gcode", "--json", "--orient", "keep"];
+        let solid = ["--set", "fill_density=100%", "--set", "skirts=0"];
+        let ran = scratch.run(&[&arguments[..], &solid[..]].concat());
+        serde_json::from_str(&ran.out).unwrap_or_else(|_| panic!("{}", ran.err))
+    };
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    // From the tip of a wedge all that is thinner than the thinnest bead is left out.
+    let wedge = [[0.0, -0.05], [30.0, -0.6], [30.0, 0.6], [0.0, 0.05]];
+    let wedge = report(&extruded(&wedge, &[], 2.0));
+    let share = number(&wedge["layers"]["covered_share"]);
+    assert!((0.95..0.995).contains(&share), "{share}");
+    let laid = number(&wedge["print"]["part_mm3"]) / number(&wedge["model"]["volume_mm3"]);
+    assert!((0.9..1.01).contains(&laid), "{laid}");
+    // The teeth of a comb.
+    let mut comb = vec![[0.0, -3.0], [21.0, -3.0], [21.0, 0.0]];
+    for (k, width) in [1.2, 1.05, 0.9, 0.75, 0.6, 0.45, 0.3].into_iter().enumerate() {
+        let (middle, half) = (19.5 - 3.0 * k as f64, width / 2.0);
+        comb.extend([[middle + half, 0.0], [middle + half, 10.0]]);
+        comb.extend([[middle - half, 10.0], [middle - half, 0.0]]);
+    }
+    comb.push([0.0, 0.0]);
+    let comb = report(&extruded(&comb, &[], 2.0));
+    assert!(number(&comb["layers"]["covered_share"]) > 0.995, "{}", comb["layers"]);
+    let laid = number(&comb["print"]["part_mm3"]) / number(&comb["model"]["volume_mm3"]);
+    assert!((0.96..1.01).contains(&laid), "{laid}");
+}

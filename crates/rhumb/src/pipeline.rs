@@ -85,6 +85,8 @@ pub struct Outcome {
     pub totals: Totals,
     /// Area that no bead fits in.
     pub lost: LostArea,
+    /// Volume of these places, mm³.
+    pub lost_volume: f64,
     /// What the user should know.
     pub warnings: Vec<Warning>,
     /// Milliseconds by stage.
@@ -176,7 +178,7 @@ pub fn slice_all(
         slice: clock.lap(),
         ..Timings::default()
     };
-    let Printed { totals, lost, heights, floating, .. } = printed;
+    let Printed { totals, lost, lost_volume, heights, floating, .. } = printed;
     Ok(Outcome {
         health,
         placed,
@@ -188,6 +190,7 @@ pub fn slice_all(
         floating,
         totals,
         lost,
+        lost_volume,
         warnings,
         timings,
     })

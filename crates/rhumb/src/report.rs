@@ -98,6 +98,8 @@ pub struct Layers {
     pub flats: Vec<Flat>,
     /// Area too thin for any bead, summed over the layers.
     pub lost_mm2: f64,
+    /// Share of the part that is not too thin for a bead.
+    pub covered_share: f64,
     /// The surfaces that were weighed, when the choice was left to rhumb.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weighed: Option<Weighed>,

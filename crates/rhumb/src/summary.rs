@@ -54,6 +54,7 @@ pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Jo
             heights_mm: outcome.heights.iter().map(|&height| tidy(height)).collect(),
             flats: outcome.layout.report(),
             lost_mm2: outcome.lost.area,
+            covered_share: 1.0 - outcome.lost_volume / volume(part),
             weighed: outcome.choice.as_ref().map(weighed),
             overhang_planar_mm2: outcome.overhang.map(|overhang| tidy(overhang.planar)),
             overhang_mm2: outcome.overhang.map(|overhang| tidy(overhang.chosen)),
