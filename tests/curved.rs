@@ -256,7 +256,11 @@ fn blends_that_cannot_be_are_refused() {
 
 /// The report of a model sliced with the full proof, and how it ended.
 fn proved(name: &str, layers: &[&str]) -> (serde_json::Value, i32) {
-    let (scratch, model) = (Scratch::new(), model(name));
+    proved_file(&model(name), layers)
+}
+
+fn proved_file(model: &std::path::Path, layers: &[&str]) -> (serde_json::Value, i32) {
+    let scratch = Scratch::new();
     let mut arguments = vec!["slice", model.to_str().unwrap(), "-o", "out.gcode", "--json"];
     arguments.extend(["--verify", "full"]);
     arguments.extend(layers);
@@ -275,10 +279,65 @@ fn beads_stay_within_the_part_at_the_axis_and_at_shallow_faces() {
         ("wall-0.6", ["--layers=conical", "--cone-angle=-30"]),
         ("gear", ["--layers=conical", "--cone-angle=45"]),
         ("gear", ["--layers=caps", "--cap-radius=80"]),
+        // A side of a column passes the axis; caps far out; beads on steep spheres.
+        ("steps", ["--layers=conical", "--cone-angle=30"]),
+        ("vase", ["--layers=caps", "--cap-radius=50"]),
+        ("lens", ["--layers=spherical", "--sphere-centre=-10"]),
     ] {
         let (report, code) = proved(name, &layers);
         assert_eq!(code, 0, "{name} {layers:?}: {}", report["verify"]);
     }
+}
+
+/// The beads that hang in the air by the proof of the program.
+fn hanging(report: &serde_json::Value) -> usize {
+    let findings = report["verify"]["findings"].as_array().unwrap();
+    findings.iter().filter(|finding| finding["check"] == "support").count()
+}
+
+#[test]
+fn cones_carry_what_hangs_over_on_planes() {
+    let (planar, code) = proved("mushroom", &[]);
+    assert!(hanging(&planar) > 0 && code == 1, "{}", planar["verify"]);
+    let (conical, code) = proved("mushroom", &["--layers=conical", "--cone-angle=46"]);
+    assert_eq!((hanging(&conical), code), (0, 0), "{}", conical["verify"]);
+    let area = |key: &str| conical["layers"][key].as_f64().unwrap();
+    // A ring of 25 and 5 mm, facing straight down.
+    let ring = std::f64::consts::PI * (25.0 * 25.0 - 5.0 * 5.0);
+    assert!((area("overhang_planar_mm2") / ring - 1.0).abs() < 0.01, "{}", conical["layers"]);
+    assert!(area("overhang_mm2") < 0.01 * ring, "{}", conical["layers"]);
+}
+
+/// An umbrella whose cover falls outwards by 20°, in bowls.
+#[test]
+fn bowls_carry_an_umbrella() {
+    let Some(folder) = crate::run::shared("models/gen") else { return };
+    let umbrella = folder.join("umbrella.stl");
+    let (planar, _) = proved_file(&umbrella, &[]);
+    assert!(hanging(&planar) > 0);
+    let (bowls, _) = proved_file(&umbrella, &["--layers=conical", "--cone-angle=-30"]);
+    assert_eq!(hanging(&bowls), 0, "{}", bowls["verify"]);
+    assert!(bowls["layers"]["overhang_planar_mm2"].as_f64().unwrap() > 2000.0);
+    assert_eq!(bowls["layers"]["overhang_mm2"], 0.0);
+}
+
+#[test]
+fn flat_tops_that_stay_steps_are_named() {
+    let spheres = ["--layers=spherical", "--sphere-centre=-60"];
+    let named = |name: &str, top: &str| {
+        let mut layers = vec!["--set", top];
+        layers.extend(spheres);
+        let (report, _) = proved(name, &layers);
+        let warnings = report["warnings"].as_array().unwrap();
+        let stepped = warnings.iter().find(|warning| warning["code"] == "FlatTopsStepped");
+        stepped.map(|warning| warning["message"].as_str().unwrap().to_owned())
+    };
+    let message = named("steps", "top=planar").unwrap();
+    for (height, is_named) in [("3.07", true), ("7.33", true), ("11.9", true), ("15", false)] {
+        assert_eq!(message.contains(&format!("z = {height} mm")), is_named, "{message}");
+    }
+    assert_eq!(named("steps", "top=curved"), None);
+    assert_eq!(named("cube", "top=planar"), None);
 }
 
 #[test]

@@ -37,6 +37,8 @@ pub struct Layout {
     pub levels: Vec<Level>,
     /// The flat faces, from the bed up.
     pub flats: Vec<MetFlat>,
+    /// Flat faces facing up that planar layers were to finish, and that curved ones end on in steps.
+    pub stepped: Vec<MetFlat>,
     /// What is still a hit, mm: half an increment, and the rounding of a level.
     pub tolerance: f64,
 }
@@ -66,7 +68,12 @@ pub fn layout(part: &Mesh, surface: &dyn LayerSurface, job: &Job) -> Result<Layo
         .map(|(flat, miss)| MetFlat { flat: *flat, miss, wanted: is_wanted(&flat) })
         .collect();
     const ROUNDING_MM: f64 = 1e-6;
-    Ok(Layout { levels, flats, tolerance: params.increment / 2.0 + ROUNDING_MM })
+    Ok(Layout {
+        levels,
+        flats,
+        stepped: Vec::new(),
+        tolerance: params.increment / 2.0 + ROUNDING_MM,
+    })
 }
 
 /// Refuses a number of layers that no printer lays.
@@ -143,6 +150,19 @@ impl Layout {
     #[must_use]
     pub fn warnings(&self, snap: Snap) -> Vec<Warning> {
         let mut warnings = Vec::new();
+        if !self.stepped.is_empty() {
+            let faces = match self.stepped.len() {
+                1 => "1 flat top is".into(),
+                count => format!("{count} flat tops are"),
+            };
+            let places: Vec<String> = self.stepped.iter().map(place).collect();
+            let message = format!(
+                "{faces} left to the curved layers, which end there in steps: {}; planar layers \
+                 finish the highest one only, where curved ones fit below",
+                places.join(", ")
+            );
+            warnings.push(Warning { code: "FlatTopsStepped".into(), message });
+        }
         if snap == Snap::Off {
             return warnings;
         }
@@ -190,6 +210,11 @@ impl Layout {
         let missed = self.missed().count();
         (wanted > 0).then(|| format!("{} of {wanted} met", wanted - missed))
     }
+}
+
+fn place(met: &MetFlat) -> String {
+    let Flat { z_mm, area_mm2, .. } = met.flat;
+    format!("z = {} mm ({} mm²)", decimal(z_mm, 3), decimal(area_mm2, 2))
 }
 
 fn faces(count: usize) -> String {

@@ -167,14 +167,16 @@ pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure>
     let all = |more: Vec<Stage>| below.into_iter().chain(more).collect();
     let top = flat_top(&layout, part).filter(|_| job.planar_top);
     let Some(finish) = top.and_then(|top| finish(top, stand, job)) else {
-        return Ok((all(vec![curved]), Layout { flats: Vec::new(), ..layout }));
+        let stepped = stepped(&layout, |_| job.planar_top);
+        return Ok((all(vec![curved]), Layout { flats: Vec::new(), stepped, ..layout }));
     };
     let first = &finish.levels[finish.printed.start];
     curved.ceiling = Some(first.upper - LEAST_WEDGE_SHARE * first.thickness());
     // The other faces are met by no layer on purpose.
     let on_top = |met: &&MetFlat| is_top(met, part);
     let flats = layout.flats.iter().filter(on_top).map(|met| MetFlat { miss: 0.0, ..*met });
-    let layout = Layout { flats: flats.collect(), ..layout };
+    let (flats, stepped) = (flats.collect(), stepped(&layout, |met| !is_top(met, part)));
+    let layout = Layout { flats, stepped, ..layout };
     Ok((all(vec![curved, finish]), layout))
 }
 
@@ -184,6 +186,12 @@ const TOP_MM: f64 = 1e-3;
 
 fn is_top(met: &MetFlat, part: &Mesh) -> bool {
     met.flat.facing == Facing::Up && (met.flat.z_mm - part.bounds().max.z).abs() <= TOP_MM
+}
+
+/// The flat faces facing up that a print is asked to finish, as far as `is_left` tells.
+fn stepped(layout: &Layout, is_left: impl Fn(&MetFlat) -> bool) -> Vec<MetFlat> {
+    let faces_up = |met: &&MetFlat| met.wanted && met.flat.facing == Facing::Up && is_left(met);
+    layout.flats.iter().filter(faces_up).copied().collect()
 }
 
 /// The height of the flat face on top of a part.
