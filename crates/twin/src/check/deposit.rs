@@ -3,7 +3,8 @@
 //! Halfway along external and overhanging perimeters both sides of the bead are looked at: a point
 //! [`STICK_OUT`] + [`SLACK`] inside either side must lie within the mesh, half a layer under the
 //! nozzle. On planar layers that is the mesh's section at the middle of the layer; on curved ones
-//! the points lie along the normal of the layer, the mesh's [columns](Columns) are asked, and how
+//! the points lie along the normal of the layer (half a layer down, and half the bead's own thickness
+//! where that differs: the better of the two counts), the mesh's [columns](Columns) are asked, and how
 //! far the bead sticks out is its distance from the mesh: curved layers meet faces at shallow
 //! angles, where a µm across is many along the layer. Less than a layer's thickness is a warning
 //! there. A bounded number of segments of each layer is looked at, spread evenly over the layer: when there
@@ -209,19 +210,11 @@ impl Deposit {
             return;
         }
         for sample in &self.samples {
-            // Along the layer, which near the apex of a cone is far from straight.
-            let at = |aside: f64| {
-                let p = self.family.walk(&sample.middle, &sample.side, aside);
-                p - self.family.normal(&p) * sample.half_height
-            };
-            let is_outside = |aside: f64| solid.columns.winding(&at(aside)) == 0;
-            let Some(sign) =
-                [1.0, -1.0].into_iter().find(|sign| is_outside(sample.inner(self.coarse) * sign))
-            else {
-                continue;
-            };
-            let edge = at(sign * sample.half_width);
-            let out = solid.nearest.distance(&edge, FAR_OUT);
+            // Wedges on a flat floor are laid for the middle of their layer, layers of uneven
+            // thickness for their own.
+            let halves = [self.half_height, sample.half_height];
+            let out = halves.map(|half| self.out_of(solid, sample, half));
+            let out = out[0].min(out[1]);
             if !exceeds(out, STICK_OUT + SLACK + self.coarse) {
                 continue;
             }
@@ -232,6 +225,21 @@ impl Deposit {
             };
             self.report(sample, out, severity, findings);
         }
+    }
+
+    /// How far a bead sticks out of the part `depth` under the nozzle, mm; 0 where it does not.
+    fn out_of(&self, solid: &Solid<'_>, sample: &Sample, depth: f64) -> f64 {
+        // Along the layer, which near the apex of a cone is far from straight.
+        let at = |aside: f64| {
+            let p = self.family.walk(&sample.middle, &sample.side, aside);
+            p - self.family.normal(&p) * depth
+        };
+        let is_outside = |aside: f64| solid.columns.winding(&at(aside)) == 0;
+        let sides = [1.0, -1.0].into_iter();
+        let out = sides
+            .filter(|sign| is_outside(sample.inner(self.coarse) * sign))
+            .map(|sign| solid.nearest.distance(&at(sign * sample.half_width), FAR_OUT));
+        out.fold(0.0, f64::max)
     }
 
     fn report(&self, sample: &Sample, out: f64, severity: Severity, findings: &mut Findings) {
