@@ -115,6 +115,7 @@ fn cones_without_slope_and_endless_spheres_are_planes() {
         (["--layers", "conical", "--cone-angle", "0.0001"], 0.005),
         // Over 26 mm this cap falls by 3 µm, which its first layer lacks at the rim.
         (["--layers", "caps", "--cap-radius", "100000"], 0.01),
+        (["--layers", "spherical", "--sphere-centre", "-100000"], 0.01),
     ] {
         let curved_layers = with(&curved);
         assert_eq!(planar.len(), curved_layers.len(), "{curved:?}");
