@@ -22,6 +22,10 @@ const QUICK: [&str; 6] = [
 ];
 
 fn program(mesh: &Mesh, angle: f64) -> String {
+    program_in(&[], mesh, angle)
+}
+
+fn program_in(layers: &[&str], mesh: &Mesh, angle: f64) -> String {
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), angle.to_radians());
     let mut turned = mesh.clone();
     for p in &mut turned.vertices {
@@ -31,6 +35,7 @@ fn program(mesh: &Mesh, angle: f64) -> String {
     scratch.file("model.stl", mesh::stl::write(&turned));
     let mut arguments = vec!["slice", "model.stl", "-q", "-o", "-", "--orient", "keep"];
     arguments.extend(QUICK);
+    arguments.extend(layers);
     scratch.run(&arguments).expect(0).out
 }
 
@@ -126,4 +131,38 @@ fn turning_a_part_by_any_angle_changes_no_layer() {
             Ok(())
         })
         .unwrap();
+}
+
+/// The same with layers of every surface: each layer gets as much material, at the same heights.
+#[test]
+fn turning_a_part_turns_its_curved_layers() {
+    let outline = [[-9.0, -7.3], [11.2, -5.1], [7.7, 9.4], [-0.8, 4.9], [-6.1, 6.2]];
+    let mesh = shapes::extruded(&outline, &[], 5.0);
+    for layers in [
+        ["--layers=conical", "--cone-angle=15"],
+        ["--layers=conical", "--cone-angle=-15"],
+        ["--layers=spherical", "--sphere-centre=-40"],
+        ["--layers=caps", "--cap-radius=60"],
+    ] {
+        let straight = program_in(&layers, &mesh, 0.0);
+        let turned = program_in(&layers, &mesh, 73.1);
+        let by = first_turn(&turned) - first_turn(&straight);
+        let off = (by - 73.1 + 180.0).rem_euclid(360.0) - 180.0;
+        assert!(off.abs() <= 0.01, "{layers:?}: printed by {by}");
+        let by_layer = |text: &str| {
+            let mut layers: BTreeMap<usize, [f64; 2]> = BTreeMap::new();
+            for motion in motions(text).iter().filter(|motion| motion.lays()) {
+                let sum = layers.entry(motion.layer.unwrap()).or_insert([0.0, f64::NEG_INFINITY]);
+                sum[0] += motion.volume();
+                sum[1] = sum[1].max(motion.to[2]);
+            }
+            layers
+        };
+        let (a, b) = (by_layer(&straight), by_layer(&turned));
+        assert!(a.len() > 10 && a.keys().eq(b.keys()), "{layers:?}: as many layers");
+        for ((layer, a), b) in a.iter().zip(b.values()) {
+            let same = (a[0] - b[0]).abs() <= 0.005 * a[0] && (a[1] - b[1]).abs() <= 0.01;
+            assert!(same, "{layers:?}, layer {layer}: {a:?} and {b:?}");
+        }
+    }
 }
