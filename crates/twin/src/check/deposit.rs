@@ -9,7 +9,8 @@
 //! angles, where a µm across is many along the layer. Less than a layer's thickness is a warning
 //! there. A bounded number of segments of each layer is looked at, spread evenly over the layer: when there
 //! are too many, every other one is dropped and only every second, fourth, eighth … is taken from
-//! then on. Prints whose outlines are moved outwards on purpose are not judged, nor planar layers in which the nozzle leaves its plane are not judged. mm, part frame.
+//! then on. Neither prints whose outlines are moved outwards on purpose are judged nor planar layers in
+//! which the nozzle leaves its plane. mm, part frame.
 
 use machine::kinematics::Alignment;
 use machine::profile::Printer;
@@ -147,7 +148,7 @@ impl Deposit {
                 line: segment.line,
                 middle,
                 side: aside / length,
-                half_width: segment.width / 2.0 - self.moved,
+                half_width: segment.width / 2.0,
                 half_height,
             });
         }
