@@ -118,6 +118,17 @@ pub(crate) fn beads<'a, 'b>(motions: &'b [Motion<'a>], role: &str) -> Vec<&'b [M
         .collect()
 }
 
+/// The walls, each in one with what of it hangs over.
+pub(crate) fn walls<'a, 'b>(motions: &'b [Motion<'a>]) -> Vec<&'b [Motion<'a>]> {
+    let is_wall = |m: &Motion| {
+        m.lays() && ["Perimeter", "External perimeter", "Overhang perimeter"].contains(&m.role)
+    };
+    motions
+        .chunk_by(|a, b| is_wall(a) && is_wall(b) && a.layer == b.layer)
+        .filter(|wall| is_wall(&wall[0]))
+        .collect()
+}
+
 /// The volume that the triangles of a binary STL enclose, mm³.
 pub(crate) fn stl_volume(bytes: &[u8]) -> f64 {
     let number = |bytes: &[u8]| f64::from(f32::from_le_bytes(bytes.try_into().unwrap()));

@@ -67,7 +67,7 @@ fn the_mushroom_hangs_in_planes_and_is_carried_on_cones() {
     assert_eq!((planar.code, &*planar.checks), (Some(1), &["support".to_owned()][..]));
     assert!(planar.all["support"]["hanging_mm"].as_f64().unwrap() > 4000.0);
     assert!(planar.all["support"]["mid_air_beads"].as_u64().unwrap() > 0);
-    for angle in ["--cone-angle=37", "--cone-angle=45"] {
+    for angle in ["--cone-angle=40", "--cone-angle=45"] {
         let conical = Printed::new("mushroom", &["--layers=conical", angle]).sound();
         let support = &conical.all["support"];
         assert_eq!((&support["hanging_mm"], &support["hanging_beads"]), (&0.0.into(), &0.into()));

@@ -1,6 +1,6 @@
 //! As much material as the part holds, in outlines that close.
 
-use crate::program::{Motion, beads, motions, stl_volume};
+use crate::program::{Motion, beads, motions, stl_volume, walls};
 use crate::run::{model, sliced};
 
 /// Solid, without anything beside the part.
@@ -69,11 +69,11 @@ fn thin_walls() {
 const SAME_PLACE_MM: f64 = 0.002;
 
 #[test]
-fn every_outer_wall_closes() {
+fn every_wall_closes() {
     for name in ["cube", "cross", "steps", "gear", "lens", "dome", "vase"] {
         let text = sliced(name, &COARSE);
         let motions = motions(&text);
-        let walls = beads(&motions, "External perimeter");
+        let walls = walls(&motions);
         assert!(!walls.is_empty(), "{name} has no walls");
         for wall in walls {
             let (first, last) = (&wall[0], &wall[wall.len() - 1]);
