@@ -59,7 +59,7 @@ pub fn markdown() -> String {
 
 const HEAD: &str = "# Settings\n\n\
     All settings with default, range and unit. Written by `UPDATE_GOLDEN=1 cargo test -- \
-    settings_page` from the table in `crates/rhumb/src/settings/key.rs`; a test holds it up to \
+    settings_page` from the tables in `crates/rhumb/src/settings/key/`; a test holds it up to \
     date.\n\n\
     Give one with `--set NAME=VALUE`, or several in a file (`--printer`, `--material`, `--print`). \
     Shares may be written as percentages.\n";

@@ -1,0 +1,348 @@
+//! The settings of a printer: facts of the machine.
+
+use super::{Default, Key, Kind, Section, choice, number, text};
+use Section::Printer;
+
+const DIALECTS: &[&str] = &[
+    "polar",
+    "rrf-direct",
+    "klipper-polar",
+    "rrf-polar",
+    "marlin-polar",
+    "grblhal-polar",
+    "cartesian",
+];
+
+/// Counts of a motor, which no program needs to say.
+const fn motor(
+    name: &'static str,
+    (default, least, greatest): (i64, i64, i64),
+    meaning: &'static str,
+) -> Key {
+    let default = Default::Count(default);
+    let kind = Kind::Count(least, greatest);
+    Key { name, section: Printer, kind, default, program_name: "", meaning }
+}
+
+const fn drive(name: &'static str, default: &'static str, meaning: &'static str) -> Key {
+    text(Printer, name, "", default, meaning)
+}
+
+/// In the order in which they are shown.
+pub(super) const KEYS: &[Key] = &[
+    text(Printer, "printer_model", "printer_model", "generic-polar", "what the machine is called"),
+    choice(Printer, "dialect", DIALECTS, "the words in which it wants its program"),
+    number(
+        Printer,
+        "rail_min_mm",
+        "rail_min",
+        (-25.0, -500.0, 500.0),
+        "least carriage position; negative when the carriage passes the centre of the bed",
+    ),
+    number(
+        Printer,
+        "rail_max_mm",
+        "rail_max",
+        (120.0, 1.0, 1000.0),
+        "greatest carriage position: the radius that can be printed",
+    ),
+    number(
+        Printer,
+        "rail_speed_mm_per_s",
+        "rail_speed",
+        (150.0, 1.0, 2000.0),
+        "greatest speed of the carriage",
+    ),
+    number(
+        Printer,
+        "rail_acceleration_mm_per_s2",
+        "rail_acceleration",
+        (1500.0, 1.0, 100_000.0),
+        "greatest acceleration of the carriage",
+    ),
+    number(
+        Printer,
+        "rail_jerk_mm_per_s",
+        "rail_jerk",
+        (8.0, 0.0, 100.0),
+        "speed that the carriage may jump by, for the time estimate",
+    ),
+    number(
+        Printer,
+        "bed_speed_deg_per_s",
+        "bed_speed",
+        (360.0, 0.1, 100_000.0),
+        "greatest turning speed of the bed",
+    ),
+    number(
+        Printer,
+        "bed_acceleration_deg_per_s2",
+        "bed_acceleration",
+        (3000.0, 0.1, 1_000_000.0),
+        "greatest turning acceleration of the bed",
+    ),
+    number(
+        Printer,
+        "bed_jerk_deg_per_s",
+        "bed_jerk",
+        (20.0, 0.0, 1000.0),
+        "turning speed that the bed may jump by, for the time estimate",
+    ),
+    Key {
+        name: "bed_reversed",
+        section: Printer,
+        kind: Kind::Switch,
+        default: Default::Switch(false),
+        program_name: "bed_reversed",
+        meaning: "whether a growing angle turns the bed counter-clockwise seen from above",
+    },
+    number(
+        Printer,
+        "turns_max",
+        "turns_max",
+        (0.0, 0.0, 1_000_000.0),
+        "turns of the bed from home, either way, that its wires allow; 0 for no bound",
+    ),
+    number(
+        Printer,
+        "bed_map_fade_mm",
+        "bed_map_fade",
+        (10.0, 0.1, 1000.0),
+        "height above which a probed bed is no longer corrected for",
+    ),
+    number(
+        Printer,
+        "z_max_mm",
+        "max_print_height",
+        (200.0, 1.0, 2000.0),
+        "greatest height of the lift",
+    ),
+    number(
+        Printer,
+        "z_speed_mm_per_s",
+        "machine_max_feedrate_z",
+        (15.0, 0.1, 500.0),
+        "greatest speed of the lift",
+    ),
+    number(
+        Printer,
+        "z_acceleration_mm_per_s2",
+        "machine_max_acceleration_z",
+        (300.0, 1.0, 10_000.0),
+        "greatest acceleration of the lift",
+    ),
+    number(
+        Printer,
+        "extruder_speed_mm_per_s",
+        "machine_max_feedrate_e",
+        (120.0, 1.0, 1000.0),
+        "greatest speed of the filament, whether fed or drawn back",
+    ),
+    number(
+        Printer,
+        "path_acceleration_mm_per_s2",
+        "machine_max_acceleration_extruding",
+        (1500.0, 1.0, 100_000.0),
+        "greatest acceleration of the nozzle along its path",
+    ),
+    number(
+        Printer,
+        "home_rail_mm",
+        "home_rail",
+        (120.0, -500.0, 1000.0),
+        "where the carriage stands after homing",
+    ),
+    number(
+        Printer,
+        "home_z_mm",
+        "home_z",
+        (5.0, 0.0, 2000.0),
+        "where the lift stands after homing",
+    ),
+    number(
+        Printer,
+        "axis_clearance_mm",
+        "axis_clearance",
+        (0.02, 0.001, 10.0),
+        "nothing runs nearer past the rotation axis, unless straight through it",
+    ),
+    drive(
+        "rail_transmission",
+        "belt 20x2",
+        "how its motor moves the carriage: belt TEETHxPITCH, screw LEAD, pinion RADIUS or step TRAVEL, mm",
+    ),
+    motor(
+        "rail_motor_steps",
+        (200, 4, 10_000),
+        "full steps in a turn of the motor of the carriage",
+    ),
+    motor("rail_microsteps", (16, 1, 1024), "pulses in a full step of that motor"),
+    number(
+        Printer,
+        "rail_gear_ratio",
+        "",
+        (1.0, 0.01, 1000.0),
+        "turns of that motor for one behind its gear",
+    ),
+    motor("bed_motor_steps", (200, 4, 10_000), "full steps in a turn of the motor of the bed"),
+    motor("bed_microsteps", (16, 1, 1024), "pulses in a full step of that motor"),
+    number(
+        Printer,
+        "bed_gear_ratio",
+        "",
+        (5.0, 0.01, 1000.0),
+        "turns of that motor for one behind its gear",
+    ),
+    number(
+        Printer,
+        "bed_inertia_kg_m2",
+        "",
+        (0.004, 0.0, 100.0),
+        "moment of inertia of bed and part, for the lag of the bed's motor",
+    ),
+    number(
+        Printer,
+        "bed_motor_current_a",
+        "",
+        (2.5, 0.01, 100.0),
+        "amplitude of the currents of the bed's motor, likewise",
+    ),
+    drive(
+        "z_transmission",
+        "screw 8",
+        "how its motor moves the lift: belt TEETHxPITCH, screw LEAD, pinion RADIUS or step TRAVEL, mm",
+    ),
+    motor("z_motor_steps", (200, 4, 10_000), "full steps in a turn of the motor of the lift"),
+    motor("z_microsteps", (16, 1, 1024), "pulses in a full step of that motor"),
+    number(
+        Printer,
+        "z_gear_ratio",
+        "",
+        (1.0, 0.01, 1000.0),
+        "turns of that motor for one behind its gear",
+    ),
+    drive(
+        "extruder_transmission",
+        "pinion 3.68",
+        "how its motor moves the filament: belt TEETHxPITCH, screw LEAD, pinion RADIUS or step TRAVEL, mm",
+    ),
+    motor(
+        "extruder_motor_steps",
+        (200, 4, 10_000),
+        "full steps in a turn of the motor of the filament",
+    ),
+    motor("extruder_microsteps", (16, 1, 1024), "pulses in a full step of that motor"),
+    number(
+        Printer,
+        "extruder_gear_ratio",
+        "",
+        (3.0, 0.01, 1000.0),
+        "turns of that motor for one behind its gear",
+    ),
+    number(
+        Printer,
+        "moves_per_second",
+        "moves_per_second",
+        (500.0, 10.0, 100_000.0),
+        "moves that the firmware takes in a second",
+    ),
+    number(
+        Printer,
+        "nozzle_diameter_mm",
+        "nozzle_diameter",
+        (0.4, 0.05, 3.0),
+        "bore of the nozzle",
+    ),
+    number(
+        Printer,
+        "nozzle_flat_radius_mm",
+        "nozzle_flat_radius",
+        (0.3, 0.05, 5.0),
+        "radius of the flat face around the bore; limits how steep curved layers may be",
+    ),
+    number(
+        Printer,
+        "nozzle_half_angle_deg",
+        "nozzle_half_angle",
+        (15.0, 1.0, 85.0),
+        "half the angle of the nozzle's cone, from its axis",
+    ),
+    number(
+        Printer,
+        "nozzle_block_height_mm",
+        "nozzle_block_height",
+        (30.0, 0.5, 500.0),
+        "height of the underside of the heater block above the tip",
+    ),
+    number(
+        Printer,
+        "nozzle_block_radius_mm",
+        "nozzle_block_radius",
+        (20.0, 0.5, 500.0),
+        "how far the heater block and what carries it reach from the nozzle's axis",
+    ),
+    number(
+        Printer,
+        "carriage_height_mm",
+        "carriage_height",
+        (60.0, 1.0, 1000.0),
+        "height of the underside of the carriage and its rail above the tip",
+    ),
+    number(
+        Printer,
+        "carriage_width_mm",
+        "carriage_width",
+        (60.0, 1.0, 1000.0),
+        "width of the carriage and its rail, across the rail, the nozzle in the middle",
+    ),
+    number(
+        Printer,
+        "min_layer_height_mm",
+        "min_layer_height",
+        (0.04, 0.01, 1.0),
+        "thinnest layer that prints well",
+    ),
+    number(
+        Printer,
+        "max_layer_height_mm",
+        "max_layer_height",
+        (0.32, 0.02, 2.0),
+        "thickest layer that prints well",
+    ),
+    number(
+        Printer,
+        "max_nozzle_temperature_c",
+        "max_nozzle_temperature",
+        (280.0, 100.0, 500.0),
+        "hottest nozzle allowed",
+    ),
+    number(
+        Printer,
+        "min_extrude_temperature_c",
+        "min_extrude_temperature",
+        (170.0, 0.0, 400.0),
+        "coldest nozzle that may feed filament",
+    ),
+    number(
+        Printer,
+        "max_bed_temperature_c",
+        "max_bed_temperature",
+        (110.0, 0.0, 200.0),
+        "hottest bed allowed",
+    ),
+    number(
+        Printer,
+        "z_increment_mm",
+        "z_increment",
+        (0.005, 0.001, 0.5),
+        "what the lift moves by; layer heights are whole multiples of it, unless snap = off",
+    ),
+    text(
+        Printer,
+        "start_gcode",
+        "",
+        "G28\nM190 S{first_layer_bed_temperature}\nM109 S{first_layer_temperature}",
+        "program before the print; names in braces are filled in",
+    ),
+    text(Printer, "end_gcode", "", "M104 S0\nM140 S0\nM107\nM84", "program after the print"),
+];
