@@ -16,16 +16,33 @@ pub(crate) type Hanging = (Point2<f64>, Bead, Overhang);
 
 /// What is below a layer, as beads of one width feel it.
 pub(crate) struct Below {
-    /// For each degree but the least: where beads hang over by less than that. Empty where no bead
-    /// of the island hangs over at all.
-    carries: Vec<(Overhang, Region)>,
+    /// For each degree but the least. Empty where no bead of the island hangs over at all.
+    carries: Vec<Ground>,
 }
+
+/// Where beads hang over by less than a degree.
+struct Ground {
+    degree: Overhang,
+    region: Region,
+    /// Its sides; none where it is empty.
+    sides: Option<Sides>,
+}
+
+impl Ground {
+    fn new(degree: Overhang, region: Region) -> Self {
+        let sides = Sides::of(&region);
+        Self { degree, region, sides }
+    }
+}
+
+/// An outline that reaches no farther beyond what is below, in widths, has no bead that hangs over.
+const NEAR: f64 = 0.25;
 
 /// How far outside of what is below a bead runs that hangs over by the degree, in widths.
 const FROM: [(Overhang, f64); 4] = [
     (Overhang::Quarter, -0.25),
     (Overhang::Half, 0.0),
-    (Overhang::Most, 0.25),
+    (Overhang::Most, NEAR),
     (Overhang::Whole, 0.5),
 ];
 
@@ -37,19 +54,24 @@ impl Below {
         let Some(below) = below else { return Self { carries } };
         // The outermost bead runs half a width inside the outline; within a quarter of a width
         // nothing hangs over.
-        let hangs = |reach: f64| !outline.difference(&chart.outset(below, reach)).is_empty();
-        if outline.difference(below).is_empty() || !hangs(0.25 * width) {
+        if outline.difference(below).is_empty() {
+            return Self { carries };
+        }
+        let near = chart.outset(below, NEAR * width);
+        if outline.difference(&near).is_empty() {
             return Self { carries };
         }
         for (degree, share) in FROM {
             let region = if share < 0.0 {
                 chart.inset(below, -share * width)
-            } else if share > 0.0 {
-                chart.outset(below, share * width)
-            } else {
+            } else if share == 0.0 {
                 below.clone()
+            } else if share == NEAR {
+                near.clone()
+            } else {
+                chart.outset(below, share * width)
             };
-            carries.push((degree, region));
+            carries.push(Ground::new(degree, region));
         }
         Self { carries }
     }
@@ -63,26 +85,27 @@ impl Below {
     pub(crate) fn along(&self, line: &[(Point2<f64>, Bead)]) -> Vec<Hanging> {
         let mut cut: Vec<Hanging> =
             line.iter().map(|(at, bead)| (*at, *bead, Overhang::None)).collect();
-        for (degree, region) in &self.carries {
-            cut = beyond(&cut, region, *degree);
+        for ground in &self.carries {
+            cut = beyond(&cut, ground);
         }
         cut
     }
 }
 
-/// Raises the pieces of a closed line outside of a region to a degree.
-fn beyond(line: &[Hanging], region: &Region, degree: Overhang) -> Vec<Hanging> {
+/// Raises the pieces of a closed line that leave the ground to its degree.
+fn beyond(line: &[Hanging], ground: &Ground) -> Vec<Hanging> {
+    let Ground { degree, region, sides } = ground;
     let points: Vec<Point2<f64>> = line.iter().map(|(at, ..)| *at).collect();
     let Some(first) = points.first() else { return Vec::new() };
     let mut inside = region.contains(first);
-    let crossings = match Sides::of(region) {
+    let crossings = match sides {
         Some(sides) => sides.crossings_of_ring(&points),
         None => Vec::new(),
     };
     let mut crossings = crossings.iter().peekable();
     let mut cut = Vec::with_capacity(line.len());
     for (piece, (at, bead, before)) in line.iter().enumerate() {
-        let degree_now = |inside: bool| if inside { *before } else { degree };
+        let degree_now = |inside: bool| if inside { *before } else { *degree };
         cut.push((*at, *bead, degree_now(inside)));
         while let Some(crossing) = crossings.next_if(|crossing| crossing.piece == piece) {
             inside = crossing.enters;
