@@ -70,12 +70,13 @@ const SAME_PLACE_MM: f64 = 0.002;
 
 #[test]
 fn every_wall_closes() {
-    for name in ["cube", "cross", "steps", "gear", "lens", "dome", "vase"] {
+    for name in ["cube", "cross", "steps", "gear", "lens", "dome", "vase", "mushroom"] {
         let text = sliced(name, &COARSE);
         let motions = motions(&text);
-        let walls = walls(&motions);
-        assert!(!walls.is_empty(), "{name} has no walls");
-        for wall in walls {
+        // Inner walls with what of them hangs over; the outer ones never change their name.
+        let (walls, outer) = (walls(&motions), beads(&motions, "External perimeter"));
+        assert!(!outer.is_empty(), "{name} has no walls");
+        for wall in walls.iter().chain(&outer) {
             let (first, last) = (&wall[0], &wall[wall.len() - 1]);
             let (a, b) = (first.at(0.0), last.at(1.0));
             let gap = (a[0] - b[0]).hypot(a[1] - b[1]).hypot(a[2] - b[2]);

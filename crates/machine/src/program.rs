@@ -111,11 +111,12 @@ impl Feed {
 /// What a stretch of material is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Role {
-    /// The wall that is seen.
+    /// The wall that is seen, whatever it rests on.
     ExternalPerimeter,
     /// A wall behind it.
     Perimeter,
-    /// A wall more than half of which the layer below does not carry.
+    /// A wall behind it, more than half of whose bead the layer below does not carry. Other slicers name
+    /// outer walls so as well.
     OverhangPerimeter,
     /// Sparse infill.
     InternalInfill,

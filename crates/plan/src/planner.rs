@@ -219,16 +219,22 @@ impl<'a> Planner<'a> {
         if heat.bridge_fan <= heat.fan || index < heat.layers_without_fan {
             return items;
         }
-        let mut fan = heat.fan;
+        let (mut fan, mut hanging) = (heat.fan, false);
         let mut all = Vec::with_capacity(items.len());
         for item in items {
-            if let Item::Step(Step::Bead(role, _)) = &item {
-                let hangs = matches!(role, Role::BridgeInfill | Role::OverhangPerimeter);
-                let wanted = if hangs { heat.bridge_fan } else { heat.fan };
-                if wanted != fan {
-                    all.push(Item::Step(Step::Fan(wanted)));
-                    fan = wanted;
+            // Lines that hang follow each other: between them the fan is left as it is.
+            let lays = match &item {
+                Item::Hangs(hangs) => {
+                    hanging = *hangs;
+                    hanging
                 }
+                Item::Stroke(stroke) => stroke.kind == Kind::Print,
+                Item::Step(step) => matches!(step, Step::Bead(..)),
+            };
+            let wanted = if hanging { heat.bridge_fan } else { heat.fan };
+            if lays && wanted != fan {
+                all.push(Item::Step(Step::Fan(wanted)));
+                fan = wanted;
             }
             all.push(item);
         }
@@ -244,7 +250,7 @@ impl<'a> Planner<'a> {
             .iter()
             .filter_map(|item| match item {
                 Item::Stroke(stroke) => Some(*stroke),
-                Item::Step(_) => None,
+                Item::Hangs(_) | Item::Step(_) => None,
             })
             .collect();
         let start = self.resampler.joints();
@@ -254,6 +260,7 @@ impl<'a> Planner<'a> {
         for item in items {
             match item {
                 Item::Step(step) => steps.push(step),
+                Item::Hangs(_) => {}
                 Item::Stroke(_) => steps.extend(moves.next().into_iter().flatten()),
             }
         }
@@ -271,7 +278,7 @@ impl<'a> Planner<'a> {
         for item in items {
             match item {
                 Item::Step(Step::Bead(role, _)) => self.role = *role,
-                Item::Step(_) => {}
+                Item::Hangs(_) | Item::Step(_) => {}
                 Item::Stroke(_) => {
                     let fed: f64 = groups
                         .next()

@@ -126,6 +126,8 @@ pub struct Stroke {
 pub enum Item {
     /// A piece of the nozzle's way.
     Stroke(Stroke),
+    /// Whether what is laid from here on hangs in the air.
+    Hangs(bool),
     /// Anything else.
     Step(Step),
 }
@@ -359,7 +361,7 @@ impl Router {
         filament: &FilamentParams,
     ) {
         let wanted = speeds.of(line.role, is_first_layer);
-        let mut told = (f64::NAN, None);
+        let (mut told, mut told_hangs) = ((f64::NAN, None), false);
         for pair in line.stations.windows(2).flat_map(|pair| in_even_pieces(&pair[0], &pair[1])) {
             let (width, area) = if line.role == Role::ExternalPerimeter {
                 within(&pair[0], &pair[1])
@@ -367,6 +369,11 @@ impl Router {
                 mean(&pair[0], &pair[1])
             };
             let overhang = if line.role.is_wall() { pair[0].overhang } else { Overhang::None };
+            let hangs = line.role == Role::BridgeInfill || overhang >= Overhang::Half;
+            if hangs != told_hangs {
+                self.items.push(Item::Hangs(hangs));
+                told_hangs = hangs;
+            }
             let role = program_role(line.role, overhang);
             let drift = (area - told.0).abs();
             if drift.is_nan() || drift > AREA_DRIFT * told.0 || Some(role) != told.1 {
@@ -381,6 +388,9 @@ impl Router {
             if let Some(printed) = &mut self.printed {
                 printed.add(&pair[0].at, &pair[1].at);
             }
+        }
+        if told_hangs {
+            self.items.push(Item::Hangs(false));
         }
         self.last_line = line.stations.iter().map(|station| station.at).collect();
     }
@@ -439,9 +449,8 @@ fn within(a: &Station, b: &Station) -> (f64, f64) {
 
 fn program_role(role: Role, overhang: Overhang) -> program::Role {
     match role {
-        Role::ExternalPerimeter | Role::Perimeter if overhang >= Overhang::Half => {
-            program::Role::OverhangPerimeter
-        }
+        // The wall that is seen keeps its name all the way round: readers join it into loops.
+        Role::Perimeter if overhang >= Overhang::Half => program::Role::OverhangPerimeter,
         Role::ExternalPerimeter => program::Role::ExternalPerimeter,
         Role::Perimeter => program::Role::Perimeter,
         Role::InternalInfill => program::Role::InternalInfill,
@@ -520,7 +529,7 @@ mod tests {
             .iter()
             .filter_map(|item| match item {
                 Item::Stroke(stroke) => Some(*stroke),
-                Item::Step(_) => None,
+                Item::Hangs(_) | Item::Step(_) => None,
             })
             .collect()
     }
