@@ -19,10 +19,18 @@ use crate::settings::Job;
 use machine::gcode::decimal;
 use machine::program::Role;
 
-/// Returns the report of a slice.
+/// Returns the report of a slice. The other ways to lie are rated for a report that is written out
+/// (`ranks`); the summary does not tell them.
 #[must_use]
-pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Job) -> Report {
+pub fn report(
+    name: &str,
+    outcome: &Outcome,
+    verdict: Option<&Verdict>,
+    job: &Job,
+    ranks: bool,
+) -> Report {
     let (health, totals, part) = (&outcome.health, &outcome.totals, part(outcome));
+    let volume = volume(part);
     let bounds = part.bounds();
     let corner = |p: Point3<f64>| [p.x, p.y, p.z];
     let skirt = Role::ALL
@@ -34,7 +42,7 @@ pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Jo
         model: Model {
             file: name.to_owned(),
             triangles: health.facets,
-            volume_mm3: volume(part),
+            volume_mm3: volume,
             bounds_mm: [corner(bounds.min), corner(bounds.max)],
         },
         mesh: MeshHealth {
@@ -46,7 +54,7 @@ pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Jo
             duplicate: health.duplicate,
             repairs: health.repairs().map(|note| note.code.to_owned()).collect(),
         },
-        orientation: orientation(outcome, job),
+        orientation: orientation(outcome, job, ranks),
         layers: Layers {
             kind: outcome.layers.word(),
             count: outcome.layout.levels.len(),
@@ -54,7 +62,7 @@ pub fn report(name: &str, outcome: &Outcome, verdict: Option<&Verdict>, job: &Jo
             heights_mm: outcome.heights.iter().map(|&height| tidy(height)).collect(),
             flats: outcome.layout.report(),
             lost_mm2: outcome.lost.area,
-            covered_share: 1.0 - outcome.lost_volume / volume(part),
+            covered_share: 1.0 - outcome.lost_volume / volume,
             weighed: outcome.choice.as_ref().map(weighed),
             overhang_planar_mm2: outcome.overhang.map(|overhang| tidy(overhang.planar)),
             overhang_mm2: outcome.overhang.map(|overhang| tidy(overhang.chosen)),
@@ -120,12 +128,12 @@ fn floating(outcome: &Outcome) -> Vec<FloatingIsland> {
     islands.collect()
 }
 
-fn orientation(outcome: &Outcome, job: &Job) -> Orientation {
+fn orientation(outcome: &Outcome, job: &Job, ranks: bool) -> Orientation {
     let rotation: &Rotation3<f64> = &outcome.placed.placement.rotation;
     let row = |i: usize| [rotation[(i, 0)], rotation[(i, 1)], rotation[(i, 2)]];
     let direction = |v: Vector3<f64>| [v.x, v.y, v.z];
     // Directions of the part, turned back to those of the model.
-    let ranked = candidates(part(outcome), &job.orient);
+    let ranked = if ranks { candidates(part(outcome), &job.orient) } else { Vec::new() };
     Orientation {
         part_from_model: [row(0), row(1), row(2)],
         normal_model: direction(rotation.inverse() * -Vector3::z()),

@@ -35,44 +35,36 @@ impl Ground {
     }
 }
 
-/// An outline that reaches no farther beyond what is below, in widths, has no bead that hangs over.
-const NEAR: f64 = 0.25;
-
-/// How far outside of what is below a bead runs that hangs over by the degree, in widths.
-const FROM: [(Overhang, f64); 4] = [
-    (Overhang::Quarter, -0.25),
-    (Overhang::Half, 0.0),
-    (Overhang::Most, NEAR),
-    (Overhang::Whole, 0.5),
-];
+/// How far outside of what is below a bead runs that hangs over by the degree, in widths. The
+/// outermost bead runs half a width inside of the outline.
+const QUARTER: f64 = -0.25;
+const MOST: f64 = 0.25;
+const WHOLE: f64 = 0.5;
 
 impl Below {
     /// `outline` is the island whose walls are judged, `below` the layer that it lies on (`None` for
     /// the bed), `width` that of the beads, mm.
     pub(crate) fn new(outline: &Region, below: Option<&Region>, chart: &Chart, width: f64) -> Self {
+        let grown = |shares: f64, from: &Region| chart.outset(from, shares * width);
         let mut carries = Vec::new();
         let Some(below) = below else { return Self { carries } };
-        // The outermost bead runs half a width inside the outline; within a quarter of a width
-        // nothing hangs over.
-        if outline.difference(below).is_empty() {
+        let bare = outline.difference(below);
+        if bare.is_empty() {
             return Self { carries };
         }
-        let near = chart.outset(below, NEAR * width);
-        if outline.difference(&near).is_empty() {
+        // As far as the outline reaches beyond what is below, less half a width, reaches the bead.
+        let most = grown(MOST, below);
+        if bare.difference(&most).is_empty() {
             return Self { carries };
         }
-        for (degree, share) in FROM {
-            let region = if share < 0.0 {
-                chart.inset(below, -share * width)
-            } else if share == 0.0 {
-                below.clone()
-            } else if share == NEAR {
-                near.clone()
-            } else {
-                chart.outset(below, share * width)
-            };
-            carries.push(Ground::new(degree, region));
+        carries.push(Ground::new(Overhang::Quarter, chart.inset(below, -QUARTER * width)));
+        let whole = grown(WHOLE, below);
+        if bare.difference(&whole).is_empty() {
+            return Self { carries };
         }
+        carries.push(Ground::new(Overhang::Half, below.clone()));
+        carries.push(Ground::new(Overhang::Most, most));
+        carries.push(Ground::new(Overhang::Whole, whole));
         Self { carries }
     }
 

@@ -91,7 +91,8 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
         return Err(failure);
     }
     outcome.timings.total = total.lap();
-    let report = summary::report(&name, &outcome, verdict.as_ref(), &job);
+    let is_written = report_file.is_some() || manner.json;
+    let report = summary::report(&name, &outcome, verdict.as_ref(), &job, is_written);
     if let Some(file) = report_file {
         fill(file, to_json(&report)?.as_bytes())?;
     }

@@ -93,7 +93,10 @@ struct Side {
 /// The sides of an area, by the cells that they run through.
 pub(crate) struct Sides {
     sides: Vec<Side>,
-    cells: Vec<Vec<u32>>,
+    /// The sides of all cells, one cell after the other.
+    by_cell: Vec<u32>,
+    /// Where the sides of each cell begin in that list, and its end.
+    begins: Vec<u32>,
     low: Point2<f64>,
     size: f64,
     columns: usize,
@@ -122,22 +125,41 @@ impl Sides {
             }
         }
         let mut grid = Self {
-            sides: Vec::new(),
-            cells: vec![Vec::new(); columns * rows],
+            sides,
+            by_cell: Vec::new(),
+            begins: vec![0; columns * rows + 1],
             low,
             size,
             columns,
             rows,
         };
-        for (index, side) in sides.iter().enumerate() {
-            let mut into = Vec::new();
-            grid.on_the_way(&side.ends, |cell| into.push(cell));
-            for cell in into {
-                grid.cells[cell].push(index as u32);
-            }
-        }
-        grid.sides = sides;
+        grid.sort_into_cells();
         Some(grid)
+    }
+
+    /// Counts the sides of each cell, and then puts them there.
+    fn sort_into_cells(&mut self) {
+        let mut visits: Vec<(u32, u32)> = Vec::with_capacity(2 * self.sides.len());
+        for (index, side) in self.sides.iter().enumerate() {
+            self.on_the_way(&side.ends, |cell| visits.push((cell as u32, index as u32)));
+        }
+        for &(cell, _) in &visits {
+            self.begins[cell as usize + 1] += 1;
+        }
+        for cell in 1..self.begins.len() {
+            self.begins[cell] += self.begins[cell - 1];
+        }
+        let mut next = self.begins.clone();
+        self.by_cell = vec![0; visits.len()];
+        for (cell, index) in visits {
+            let place = &mut next[cell as usize];
+            self.by_cell[*place as usize] = index;
+            *place += 1;
+        }
+    }
+
+    fn in_cell(&self, cell: usize) -> &[u32] {
+        &self.by_cell[self.begins[cell] as usize..self.begins[cell + 1] as usize]
     }
 
     /// Calls `visit` with every cell that a segment runs through or past the corner of.
@@ -186,7 +208,7 @@ impl Sides {
         for piece in 0..pieces {
             let ends = [points[piece], points[(piece + 1) % count]];
             near.clear();
-            self.on_the_way(&ends, |cell| near.extend(&self.cells[cell]));
+            self.on_the_way(&ends, |cell| near.extend(self.in_cell(cell)));
             near.sort_unstable();
             near.dedup();
             let first = crossings.len();
