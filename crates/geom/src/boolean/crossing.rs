@@ -116,6 +116,43 @@ fn chunks(rings: &[Simple]) -> Vec<Chunk> {
     chunks
 }
 
+/// A side of a ring, by the number of its first point, and the box around it.
+#[derive(Clone, Copy)]
+struct Side {
+    index: usize,
+    ends: [GridPoint; 2],
+    bounds: Bounds,
+}
+
+/// The sides of a chunk that reach into a box.
+struct Reaching {
+    sides: [Side; SIDES_PER_CHUNK],
+    count: usize,
+}
+
+impl Reaching {
+    fn of(ring: &Simple, chunk: &Chunk, into: &Bounds) -> Self {
+        let (mut index, mut a) = (chunk.first, ring.points[chunk.first]);
+        let none = Side { index, ends: [a, a], bounds: Bounds::of_side(a, a) };
+        let mut reaching = Self { sides: [none; SIDES_PER_CHUNK], count: 0 };
+        let closing = (chunk.end == ring.points.len()).then_some(&ring.points[0]);
+        let last = chunk.end.min(ring.points.len() - 1);
+        for &b in ring.points[chunk.first + 1..=last].iter().chain(closing) {
+            let bounds = Bounds::of_side(a, b);
+            if bounds.meets(into) {
+                reaching.sides[reaching.count] = Side { index, ends: [a, b], bounds };
+                reaching.count += 1;
+            }
+            (index, a) = (index + 1, b);
+        }
+        reaching
+    }
+
+    fn sides(&self) -> &[Side] {
+        &self.sides[..self.count]
+    }
+}
+
 fn add_crossings(
     rings: &[Simple],
     one: &Chunk,
@@ -124,24 +161,26 @@ fn add_crossings(
 ) -> Option<()> {
     let (p, q) = (&rings[one.ring], &rings[other.ring]);
     let is_same_ring = one.ring == other.ring;
+    let is_same_chunk = is_same_ring && one.first == other.first;
     let count = p.points.len();
-    for i in one.first..one.end {
-        let (a, b) = p.side(i);
-        let side = Bounds::of_side(a, b);
-        if !side.meets(&other.bounds) {
-            continue;
-        }
-        let from = if is_same_ring && one.first == other.first { i + 1 } else { other.first };
-        for j in from..other.end {
-            let (c, d) = q.side(j);
-            if !side.meets(&Bounds::of_side(c, d)) {
+    let common = one.bounds.common(&other.bounds);
+    let ours = Reaching::of(p, one, &common);
+    let theirs = if is_same_chunk { None } else { Some(Reaching::of(q, other, &common)) };
+    for (k, side) in ours.sides().iter().enumerate() {
+        let against = match &theirs {
+            Some(theirs) => theirs.sides(),
+            None => &ours.sides()[k + 1..],
+        };
+        for with in against {
+            if !side.bounds.meets(&with.bounds) {
                 continue;
             }
+            let (i, j) = (side.index, with.index);
             // Neighbours meet in their corner and, since none turns back, nowhere else.
-            if is_same_ring && ((i + 1) % count == j || (j + 1) % count == i) {
+            if is_same_ring && (i.abs_diff(j) == 1 || i.abs_diff(j) == count - 1) {
                 continue;
             }
-            match meeting([a, b], [c, d]) {
+            match meeting(side.ends, with.ends) {
                 Meeting::Apart => {}
                 Meeting::Touch => return None,
                 Meeting::Cross { at, along, to_the_right } => {

@@ -163,6 +163,15 @@ impl Bounds {
         }
     }
 
+    /// What two boxes that meet have in common.
+    pub(super) fn common(&self, other: &Self) -> Self {
+        let (a, b) = (self, other);
+        Self {
+            min: GridPoint::new(a.min.x.max(b.min.x), a.min.y.max(b.min.y)),
+            max: GridPoint::new(a.max.x.min(b.max.x), a.max.y.min(b.max.y)),
+        }
+    }
+
     pub(super) fn meets(&self, other: &Self) -> bool {
         self.min.x <= other.max.x
             && other.min.x <= self.max.x
