@@ -52,7 +52,7 @@ pub(super) fn crossings(rings: &[Simple]) -> Option<Vec<Crossing>> {
 
 /// Sides that share a box: few enough that comparing each with each is cheap, enough that there
 /// are few boxes.
-const SIDES_PER_CHUNK: usize = 12;
+const SIDES_PER_CHUNK: usize = 8;
 
 /// Consecutive sides of a ring.
 struct Chunk {
