@@ -14,6 +14,7 @@ mod comb;
 mod comparison;
 mod corpus;
 mod corpus_made;
+mod curve;
 mod curved;
 mod golden;
 mod house;

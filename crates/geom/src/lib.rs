@@ -5,7 +5,8 @@
 //!
 //! In reading order: [`grid`] and [`tolerance`] say what "equal" means; [`region`] holds closed
 //! planar areas with their booleans, [`offset`] moves their borders, [`simplify`] thins them out;
-//! [`polyline`] measures open and closed lines; [`spiral`] is the Archimedean spiral;
+//! [`polyline`] measures open and closed lines; [`spiral`] is the Archimedean spiral, [`spherical`] its
+//! kin on a sphere;
 //! [`circle`] encloses points; [`triangulate`] fills rings with triangles; [`bounding`] finds
 //! boxes that meet; [`lift`] says how far a tool must be raised to clear a bead.
 //!
@@ -22,6 +23,7 @@ pub mod offset;
 pub mod polyline;
 pub mod region;
 pub mod simplify;
+pub mod spherical;
 pub mod spiral;
 pub mod tolerance;
 pub mod triangulate;

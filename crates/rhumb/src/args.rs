@@ -1,6 +1,7 @@
 //! What can be typed.
 
 mod calibrate;
+mod curve;
 
 use std::path::PathBuf;
 
@@ -11,6 +12,7 @@ use crate::settings::Sources;
 pub use calibrate::{
     Calibrate, CalibrateFit, CalibratePins, CalibrateScan, CalibrateShow, Procedure,
 };
+pub use curve::{Archimedes, Curve, LoxodromeCurve};
 
 /// A curved-layer slicer for polar 3-D printers.
 #[derive(Debug, Parser)]
@@ -93,9 +95,14 @@ pub enum Command {
     Steps(Box<Steps>),
     /// Turn a stepper on its driver: currents, speed, angle, final error
     Motor(MotorTurn),
+    /// Write a bare spherical spiral, for CAD or for a look
+    #[command(subcommand)]
+    Curve(Curve),
     /// List, show and check settings
     #[command(subcommand)]
     Profile(Profile),
+    /// Write the completions of a shell to standard output
+    Completions(Completions),
     /// Write a built-in model
     #[command(hide = true)]
     Model(Model),
@@ -693,6 +700,14 @@ pub enum Profile {
         #[arg(short, long, value_name = "NAME")]
         output: Option<PathBuf>,
     },
+}
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+pub struct Completions {
+    /// The shell
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
 }
 
 /// Arguments of `model`.

@@ -51,13 +51,16 @@ impl Files {
                 .reads_settings(&a.settings)
                 .writes(a.output.iter().chain(&a.picture)),
             Command::Motor(a) => files.writes(&a.output),
+            Command::Curve(a) => files.writes(a.output()),
             Command::Model(a) => files.writes(&a.output),
             Command::Calibrate(calibrate) => files.of_calibration(calibrate),
             // Its outputs are looked at by each slice.
             Command::Batch(a) => files.reads_settings(&a.settings),
-            Command::Inspect(_) | Command::Verify(_) | Command::Send(_) | Command::Profile(_) => {
-                files
-            }
+            Command::Inspect(_)
+            | Command::Verify(_)
+            | Command::Send(_)
+            | Command::Profile(_)
+            | Command::Completions(_) => files,
         }
     }
 

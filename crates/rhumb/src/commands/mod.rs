@@ -2,7 +2,9 @@
 
 mod batch;
 mod calibrate;
+mod completions;
 mod convert;
+mod curve;
 mod files;
 mod inspect;
 mod model;
@@ -58,6 +60,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         Command::Send(arguments) => send::run(arguments, manner),
         Command::Motor(arguments) => motor::run(arguments, manner),
         Command::Steps(arguments) => steps::run(arguments, manner),
+        Command::Curve(curve) => curve::run(curve, manner),
+        Command::Completions(arguments) => completions::run(arguments),
         Command::Profile(profile) => profile::run(profile, manner),
         Command::Model(arguments) => model::run(arguments),
     }

@@ -7,9 +7,10 @@
 //! text are of middle lightness: pictures have no background of their own and are legible on
 //! white and on black. [`fit`] and [`error_map`] draw a calibration instead of a
 //! program, [`step_map`] what whole steps of its motors make of one,
-//! [`motor`] what a motor does during a turn.
+//! [`motor`] what a motor does during a turn, [`curve`] a bare curve on a sphere.
 
 pub mod camera;
+pub mod curve;
 pub mod deposit;
 pub mod error_map;
 pub mod fit;
