@@ -538,6 +538,8 @@ M84
 ; min_extrude_temperature = 170
 ; max_bed_temperature = 110
 ; z_increment = 0.005
+; remaining_times = 0
+; gcode_label_objects = firmware
 ; filament_type = PLA
 ; filament_diameter = 1.75
 ; filament_density = 1.24
@@ -555,6 +557,9 @@ M84
 ; wipe_distance = 0
 ; pressure_advance = 0
 ; fan_speed = 100%
+; min_fan_speed = 100%
+; fan_below_layer_time = 60
+; full_fan_speed_layer = 0
 ; bridge_fan_speed = 100%
 ; disable_fan_first_layers = 1
 ; slowdown_below_layer_time = 8
@@ -635,3 +640,18 @@ M84
 ; travel_chord = 0.1
 ; overhang_angle = 45
 ; flat_angle = 1
+; default_acceleration = 0
+; perimeter_acceleration = 0
+; external_perimeter_acceleration = 0
+; infill_acceleration = 0
+; solid_infill_acceleration = 0
+; top_solid_infill_acceleration = 0
+; bridge_acceleration = 0
+; first_layer_acceleration = 0
+; travel_acceleration = 0
+; scarf_seam_placement = nowhere
+; scarf_seam_on_inner_perimeters = 0
+; scarf_seam_start_height = 0%
+; scarf_seam_length = 20
+; scarf_seam_entire_loop = 0
+; scarf_seam_max_segment_length = 1

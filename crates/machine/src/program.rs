@@ -202,6 +202,12 @@ pub enum Step {
     Bead(Role, f64),
     /// The part fan, 0 (off) to 1.
     Fan(f64),
+    /// What follows belongs to one of several objects, counted from 0, or to none.
+    Object(Option<usize>),
+    /// How long the print has taken so far, s.
+    Elapsed(f64),
+    /// How fast the firmware may speed up the nozzle from here on, mm/s².
+    Acceleration(f64),
     /// A remark, for people.
     Remark(String),
     /// One line of the start or end program, as the printer's owner wrote it.

@@ -93,7 +93,8 @@ impl Follower {
         let (times, pace) = durations(&legs, &travels, self.pace, &self.limits);
         self.pace = pace;
         let taken = taken(&legs, start, &times, &self.dialect).times;
-        self.time += time::estimate(&legs, &travels, &taken, &self.printer, self.dialect.space);
+        self.time +=
+            time::estimate(&legs, &travels, &taken, &self.printer, self.dialect.space, &[]);
         Ok(Followed { legs, durations: times, counts })
     }
 

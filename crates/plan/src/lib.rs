@@ -9,16 +9,19 @@
 //! stretches short layers, [`time`] estimates how long the print takes; [`planner`] runs it all,
 //! layer by layer.
 
+pub mod acceleration;
 pub mod axis;
 mod comb;
 pub mod cooling;
 pub mod follow;
 pub mod helix;
+pub mod objects;
 pub mod order;
 pub mod planner;
 pub mod printed;
 pub mod resample;
 pub mod route;
+pub mod scarf;
 pub mod seam;
 pub mod slow_flow;
 pub mod speed;

@@ -36,6 +36,8 @@ pub struct OrderedLine {
     pub stations: Vec<Station>,
     /// The island it belongs to, by index in the layer; `None` for skirt and brim.
     pub island: Option<usize>,
+    /// Whether it begins and ends in a slope (see [`scarf`](crate::scarf)).
+    pub slopes: bool,
 }
 
 /// Puts the lines of a layer in order, beginning at `nozzle`.
@@ -192,7 +194,7 @@ impl Ordering<'_> {
         if reversed {
             stations.reverse();
         }
-        self.push(OrderedLine { role: fill.role, stations, island: None });
+        self.push(OrderedLine { role: fill.role, stations, island: None, slopes: false });
     }
 
     fn closed_from_nearest(&mut self, path: &Toolpath) {
@@ -254,7 +256,7 @@ fn begun_at(path: &Toolpath, begin: Begin) -> OrderedLine {
         stations.extend(all[after..].iter().chain(&all[..=after]));
     }
     stations.dedup_by(|a, b| a.at == b.at && a.bead == b.bead && a.overhang == b.overhang);
-    OrderedLine { role: path.role, stations, island: None }
+    OrderedLine { role: path.role, stations, island: None, slopes: false }
 }
 
 /// The station at a share of the way from one to the next.

@@ -3,18 +3,21 @@
 use machine::kinematics::Unreachable;
 use machine::profile::Printer;
 use machine::program::{Joints, Move, Role, Step};
-use nalgebra::{Point2, Point3};
+use nalgebra::{Point2, Point3, Vector3};
 use slicer::toolpath::LayerPaths;
 
+use crate::acceleration::Accelerations;
 use crate::cooling::{CoolingParams, slow_down};
 use crate::helix::Helix;
-use crate::order::{OrderParams, order};
+use crate::objects::Objects;
+use crate::order::{OrderParams, OrderedLine, order};
 use crate::printed::Printed;
 use crate::resample::{Leg, ResampleParams, Resampler};
 use crate::route::{FilamentParams, Item, Kind, Router, Speeds, Stroke};
+use crate::scarf::{ScarfParams, ScarfPlacement};
 use crate::seam::SeamMemory;
 use crate::slow_flow::{FlowWatch, SlowFlow};
-use crate::speed::{Limits, Pace, durations, taken, travels};
+use crate::speed::{Limits, Pace, gentle_durations, taken, travels};
 use crate::time;
 
 /// Choices of the plan.
@@ -28,6 +31,10 @@ pub struct PlanParams {
     pub filament: FilamentParams,
     /// How closely moves follow lines.
     pub resample: ResampleParams,
+    /// How fast the nozzle is sped up.
+    pub accelerations: Accelerations,
+    /// How the ends of walls meet their begins.
+    pub scarf: ScarfParams,
     /// Least layer time.
     pub cooling: CoolingParams,
     /// Part fan and nozzle temperature.
@@ -47,8 +54,42 @@ pub struct HeatParams {
     pub fan: f64,
     /// The same for bridges and overhangs, where that is more.
     pub bridge_fan: f64,
+    /// Part fan of layers that take [`long_layer`](Self::long_layer) or more, 0 to 1; in between it
+    /// falls evenly from [`fan`](Self::fan), which is that of layers of
+    /// [`short_layer`](Self::short_layer) and less.
+    pub least_fan: f64,
+    /// s.
+    pub short_layer: f64,
+    /// s.
+    pub long_layer: f64,
     /// Layers without fan at the bottom.
     pub layers_without_fan: usize,
+    /// The layer, counted from 1, from which on the fan is not held back; below it grows evenly.
+    pub full_fan_layer: usize,
+}
+
+impl HeatParams {
+    /// The part fan of a layer that takes so long (s).
+    fn fan_of(&self, index: usize, time: f64) -> f64 {
+        if index < self.layers_without_fan {
+            return 0.0;
+        }
+        let least = self.least_fan.min(self.fan);
+        let long = (time - self.short_layer) / (self.long_layer - self.short_layer);
+        let fan = if time <= self.short_layer {
+            self.fan
+        } else if time >= self.long_layer {
+            least
+        } else {
+            self.fan + (least - self.fan) * long
+        };
+        let count = index + 1;
+        if count >= self.full_fan_layer {
+            return fan;
+        }
+        let without = self.layers_without_fan as f64;
+        fan * (count as f64 - without) / (self.full_fan_layer as f64 - without)
+    }
 }
 
 /// What a program amounts to.
@@ -103,6 +144,36 @@ pub struct PlanError {
 /// How a program says that the following layer climbs in one turn.
 const CLIMBS: &str = "spiral vase";
 
+/// Stands for the part fan of the layer, which depends on the time that it takes.
+const USUAL_FAN: f64 = -1.0;
+
+/// Changes of the part fan that nobody notices, as a share of its full speed.
+const FAN_STEP: f64 = 0.01;
+
+/// About how often a program says how long it has taken so far, s.
+pub const TOLD_EVERY_S: f64 = 15.0;
+
+/// Puts the time that has passed between the steps of a layer, at its begin and every so often; what the
+/// moves were planned to take is stretched to the layer's estimate.
+fn timed(steps: Vec<Step>, from: f64, to: f64) -> Vec<Step> {
+    let planned = |step: &Step| if let Step::Move(motion) = step { motion.duration } else { 0.0 };
+    let all: f64 = steps.iter().map(planned).sum();
+    let scale = if all > 0.0 { (to - from) / all } else { 0.0 };
+    let (mut now, mut told) = (from, f64::NEG_INFINITY);
+    let mut with_times = Vec::with_capacity(steps.len() + 1);
+    for step in steps {
+        let is_due = matches!(step, Step::Layer(_)) || now - told >= TOLD_EVERY_S;
+        let after = is_due.then_some(Step::Elapsed(now));
+        told = if is_due { now } else { told };
+        now += planned(&step) * scale;
+        // What belongs to a layer stands behind its begin.
+        let is_begin = matches!(step, Step::Layer(_));
+        let (before, after) = if is_begin { (None, after) } else { (after, None) };
+        with_times.extend(before.into_iter().chain([step]).chain(after));
+    }
+    with_times
+}
+
 /// Plans layer after layer. See the [module](self).
 pub struct Planner<'a> {
     printer: &'a Printer,
@@ -116,6 +187,13 @@ pub struct Planner<'a> {
     totals: Totals,
     flow: FlowWatch,
     role: Role,
+    /// The part fan as it was told last.
+    fan: f64,
+    objects: Option<Objects>,
+    tells_time: bool,
+    is_first_layer: bool,
+    /// The acceleration that was told last, mm/s².
+    acceleration: f64,
 }
 
 impl<'a> Planner<'a> {
@@ -139,7 +217,24 @@ impl<'a> Planner<'a> {
             totals: Totals::default(),
             flow: FlowWatch::new(params.filament.least_flow, params.filament.area),
             role: Role::Custom,
+            fan: 0.0,
+            objects: None,
+            tells_time: false,
+            is_first_layer: true,
+            acceleration: f64::NAN,
         }
+    }
+
+    /// Tells which of several objects lines belong to.
+    #[must_use]
+    pub fn with_objects(self, objects: Objects) -> Self {
+        Self { objects: Some(objects), ..self }
+    }
+
+    /// Tells how long the print has taken so far, every [`TOLD_EVERY_S`] or so.
+    #[must_use]
+    pub fn telling_time(self) -> Self {
+        Self { tells_time: true, ..self }
     }
 
     /// Plans the next layer.
@@ -148,6 +243,20 @@ impl<'a> Planner<'a> {
     ///
     /// [`PlanError`] where a line comes nearer to the axis than the rail can.
     pub fn layer(&mut self, layer: &LayerPaths) -> Result<Vec<Step>, PlanError> {
+        self.layer_on(layer, |_| Vector3::z())
+    }
+
+    /// Like [`layer`](Self::layer), for a layer with these unit normals, upwards.
+    ///
+    /// # Errors
+    ///
+    /// As [`layer`](Self::layer).
+    pub fn layer_on(
+        &mut self,
+        layer: &LayerPaths,
+        normal: impl Fn(&Point3<f64>) -> Vector3<f64>,
+    ) -> Result<Vec<Step>, PlanError> {
+        self.is_first_layer = layer.index == 0;
         let nozzle = self.begin_at();
         let turn = self.helix.turn(layer, nozzle);
         let climbs = turn.is_some();
@@ -155,16 +264,41 @@ impl<'a> Planner<'a> {
             Some(turn) => vec![turn],
             None => order(layer, nozzle, &mut self.seams, &self.params.order),
         };
+        let lines = self.with_scarfs(lines, normal);
+        if let Some(objects) = &self.objects {
+            self.router.belong_to(objects.of_islands(layer, self.params.resample.azimuth));
+        }
         let items = self.router.layer(layer, &lines, &self.params.speeds, &self.params.filament);
         let items = self.with_bridge_fan(items, layer.index);
-        let mut steps = self.heat(layer.index);
+        let before = self.totals.time;
+        let planned =
+            self.lower(items).map_err(|source| PlanError { layer: layer.index, source })?;
+        let fan = self.params.heat.fan_of(layer.index, self.totals.time - before);
+        let mut steps = self.heat(layer.index, fan);
         if climbs {
             steps.push(Step::Remark(CLIMBS.into()));
         }
-        let planned =
-            self.lower(items).map_err(|source| PlanError { layer: layer.index, source })?;
-        steps.extend(planned);
+        steps.extend(self.with_usual_fan(planned));
+        if self.tells_time {
+            steps = timed(steps, before, self.totals.time);
+        }
         Ok(steps)
+    }
+
+    /// Gives walls the seams that are wanted; on the first layer there is nothing to lie on.
+    fn with_scarfs(
+        &self,
+        lines: Vec<OrderedLine>,
+        normal: impl Fn(&Point3<f64>) -> Vector3<f64>,
+    ) -> Vec<OrderedLine> {
+        let scarf = &self.params.scarf;
+        if self.is_first_layer || scarf.placement == ScarfPlacement::Nowhere {
+            return lines;
+        }
+        let seamed = |line: OrderedLine| {
+            if scarf.suits(&line) { scarf.scarfed(&line, &normal) } else { line }
+        };
+        lines.into_iter().map(seamed).collect()
     }
 
     /// Where the order of a layer begins: where the nozzle is. Home stands still while the part may
@@ -195,31 +329,34 @@ impl<'a> Planner<'a> {
             let at = self.printer.alignment.part_from_joints(&to);
             let speed = self.params.speeds.travel;
             let leg = Leg { kind: Kind::Travel, to, at, filament: 0.0, path, speed };
-            steps.extend(self.timed(vec![vec![leg]], from).into_iter().flatten());
+            let gentle = [self.params.accelerations.of_travel()];
+            steps.extend(self.timed(vec![vec![leg]], from, &gentle).into_iter().flatten());
         }
         Ok((steps, Totals { slow_flow: self.flow.found(), ..self.totals }))
     }
 
-    fn heat(&self, index: usize) -> Vec<Step> {
+    fn heat(&mut self, index: usize, fan: f64) -> Vec<Step> {
         let heat = &self.params.heat;
         let mut steps = Vec::new();
         if index == 1 && heat.temperature != heat.first_layer_temperature {
             let celsius = machine::gcode::decimal(heat.temperature, 0);
             steps.push(Step::Custom(format!("M104 S{celsius}")));
         }
-        if index == heat.layers_without_fan && heat.fan > 0.0 {
-            steps.push(Step::Fan(heat.fan));
+        if (fan - self.fan).abs() >= FAN_STEP || (fan == 0.0 && self.fan > 0.0) {
+            steps.push(Step::Fan(fan));
+            self.fan = fan;
         }
         steps
     }
 
-    /// Turns the fan up for what hangs in the air.
+    /// Turns the fan up for what hangs in the air, and back to [`USUAL_FAN`].
     fn with_bridge_fan(&self, items: Vec<Item>, index: usize) -> Vec<Item> {
         let heat = &self.params.heat;
-        if heat.bridge_fan <= heat.fan || index < heat.layers_without_fan {
+        let may_be_less = heat.least_fan.min(heat.fan) < heat.bridge_fan;
+        if !may_be_less && heat.full_fan_layer <= index || index < heat.layers_without_fan {
             return items;
         }
-        let (mut fan, mut hanging) = (heat.fan, false);
+        let (mut fan, mut hanging) = (USUAL_FAN, false);
         let mut all = Vec::with_capacity(items.len());
         for item in items {
             // Lines that hang follow each other: between them the fan is left as it is.
@@ -231,17 +368,27 @@ impl<'a> Planner<'a> {
                 Item::Stroke(stroke) => stroke.kind == Kind::Print,
                 Item::Step(step) => matches!(step, Step::Bead(..)),
             };
-            let wanted = if hanging { heat.bridge_fan } else { heat.fan };
+            let wanted = if hanging { heat.bridge_fan } else { USUAL_FAN };
             if lays && wanted != fan {
                 all.push(Item::Step(Step::Fan(wanted)));
                 fan = wanted;
             }
             all.push(item);
         }
-        if fan != heat.fan {
-            all.push(Item::Step(Step::Fan(heat.fan)));
+        if fan != USUAL_FAN {
+            all.push(Item::Step(Step::Fan(USUAL_FAN)));
         }
         all
+    }
+
+    /// Puts the layer's fan where it was left open; it stays where bridges want no more.
+    fn with_usual_fan(&self, steps: Vec<Step>) -> impl Iterator<Item = Step> {
+        let (usual, more) = (self.fan, self.params.heat.bridge_fan > self.fan);
+        steps.into_iter().filter_map(move |step| match step {
+            Step::Fan(_) if !more => None,
+            Step::Fan(USUAL_FAN) => Some(Step::Fan(usual)),
+            step => Some(step),
+        })
     }
 
     /// Turns strokes into timed moves, in their places between the other steps.
@@ -275,43 +422,53 @@ impl<'a> Planner<'a> {
         items: &[Item],
     ) -> Vec<Vec<Step>> {
         let mut groups = legs.iter();
+        let wanted = self.params.accelerations;
+        let mut accelerations = Vec::new();
         for item in items {
             match item {
                 Item::Step(Step::Bead(role, _)) => self.role = *role,
                 Item::Hangs(_) | Item::Step(_) => {}
                 Item::Stroke(_) => {
-                    let fed: f64 = groups
-                        .next()
-                        .into_iter()
-                        .flatten()
-                        .filter(|leg| leg.kind == Kind::Print)
-                        .map(|leg| leg.filament)
-                        .sum();
+                    let group = groups.next().into_iter().flatten();
+                    let mut fed = 0.0;
+                    for leg in group {
+                        let prints = leg.kind == Kind::Print;
+                        fed += if prints { leg.filament } else { 0.0 };
+                        accelerations.push(if prints {
+                            wanted.of(self.role, self.is_first_layer)
+                        } else {
+                            wanted.of_travel()
+                        });
+                    }
                     let place = Role::ALL.iter().position(|role| *role == self.role);
                     self.totals.volume[place.expect("all roles are listed")] +=
                         fed * self.params.filament.area;
                 }
             }
         }
-        self.timed(legs, start)
+        self.timed(legs, start, &accelerations)
     }
 
     /// Gives every leg its duration.
-    fn timed(&mut self, groups: Vec<Vec<Leg>>, start: Joints) -> Vec<Vec<Step>> {
+    fn timed(&mut self, groups: Vec<Vec<Leg>>, start: Joints, wanted: &[f64]) -> Vec<Vec<Step>> {
         let sizes: Vec<usize> = groups.iter().map(Vec::len).collect();
         let mut legs: Vec<Leg> = groups.into_iter().flatten().collect();
         let travels = travels(&legs, start);
-        let (mut times, mut pace) = durations(&legs, &travels, self.pace, &self.limits);
+        let durations = |legs: &[Leg], pace: Pace, limits: &Limits| {
+            gentle_durations(legs, &travels, pace, limits, wanted)
+        };
+        let (mut times, mut pace) = durations(&legs, self.pace, &self.limits);
         let least_feed = self.params.filament.least_flow / self.params.filament.area;
         if slow_down(&mut legs, &times, &self.params.cooling, least_feed) {
-            (times, pace) = durations(&legs, &travels, self.pace, &self.limits);
+            (times, pace) = durations(&legs, self.pace, &self.limits);
         }
         self.pace = pace;
         let dialect = &self.params.resample.dialect;
         let taken = taken(&legs, start, &times, dialect);
         self.totals.paced += taken.paced;
         let taken = taken.times;
-        self.totals.time += time::estimate(&legs, &travels, &taken, self.printer, dialect.space);
+        let space = dialect.space;
+        self.totals.time += time::estimate(&legs, &travels, &taken, self.printer, space, wanted);
         for (leg, travel) in legs.iter().zip(&travels) {
             self.count(leg, travel.axes[1]);
         }
@@ -322,7 +479,27 @@ impl<'a> Planner<'a> {
             self.flow.look(&Move { duration: taken, ..motion });
             Step::Move(motion)
         });
-        sizes.iter().map(|&size| timed.by_ref().take(size).collect()).collect()
+        let groups: Vec<Vec<Step>> =
+            sizes.iter().map(|&size| timed.by_ref().take(size).collect()).collect();
+        if self.params.accelerations.are_wanted() { self.told(groups, wanted) } else { groups }
+    }
+
+    /// Puts the acceleration before every move that has another than the one before.
+    fn told(&mut self, groups: Vec<Vec<Step>>, wanted: &[f64]) -> Vec<Vec<Step>> {
+        let most = self.printer.path_acceleration;
+        let mut wanted = wanted.iter().map(|wanted| wanted.min(most));
+        let told = |steps: Vec<Step>| {
+            let mut all = Vec::with_capacity(steps.len());
+            for step in steps {
+                if let Some(next) = wanted.next().filter(|next| *next != self.acceleration) {
+                    all.push(Step::Acceleration(next));
+                    self.acceleration = next;
+                }
+                all.push(step);
+            }
+            all
+        };
+        groups.into_iter().map(told).collect()
     }
 
     fn count(&mut self, leg: &Leg, turned: f64) {

@@ -144,12 +144,19 @@ pub struct Router {
     lift_speed: f64,
     /// What stands on the bed, where layers are curved.
     printed: Option<Printed>,
+    /// The object of each island, where there are several.
+    objects: Vec<usize>,
     items: Vec<Item>,
 }
 
 /// Travel may graze what is printed by this much, mm: what neighbouring beads of a slope stand above
 /// each other in the same cell of [`Printed`].
 const CLEAR_MM: f64 = 0.1;
+
+/// How a program says that a wall begins and ends in a slope, and that it is done.
+const SLOPES: &str = "scarf seam";
+
+const SLOPES_END: &str = "scarf seam done";
 
 /// A line's cross-section may drift by this share before viewers are told its width.
 const AREA_DRIFT: f64 = 0.02;
@@ -166,6 +173,7 @@ impl Router {
             top: 0.0,
             lift_speed,
             printed,
+            objects: Vec::new(),
             items: Vec::new(),
         }
     }
@@ -180,6 +188,11 @@ impl Router {
     #[must_use]
     pub fn top(&self) -> f64 {
         self.top
+    }
+
+    /// Says to which of several objects the islands of the next layer belong.
+    pub(crate) fn belong_to(&mut self, objects: Vec<usize>) {
+        self.objects = objects;
     }
 
     /// Returns the strokes of a layer whose lines are in order.
@@ -202,6 +215,7 @@ impl Router {
         // Combs of islands, made when they are wanted.
         let mut combs: Vec<Option<Comb>> = vec![None; layer.islands.len()];
         for line in lines {
+            self.turn_to(line.island);
             let same_island = line.island.is_some() && line.island == last_island;
             let inside = line.island.filter(|_| same_island).map(|i| &layer.islands[i].outline);
             let to = line.stations[0].at;
@@ -209,10 +223,26 @@ impl Router {
             if !self.combed(&to, inside.zip(comb), speeds.travel, filament) {
                 self.travel(to, inside, speeds.travel, filament);
             }
+            let said = |what: &str| Item::Step(Step::Remark(what.into()));
+            if line.slopes {
+                self.items.push(said(SLOPES));
+            }
             self.line(line, layer.index == 0, speeds, filament);
+            if line.slopes {
+                self.items.push(said(SLOPES_END));
+            }
             last_island = line.island;
         }
+        self.turn_to(None);
         std::mem::take(&mut self.items)
+    }
+
+    /// Says which object the following strokes belong to, the way to them included.
+    fn turn_to(&mut self, island: Option<usize>) {
+        if !self.objects.is_empty() {
+            let object = island.and_then(|island| self.objects.get(island)).copied();
+            self.items.push(Item::Step(Step::Object(object)));
+        }
     }
 
     /// Returns the strokes that draw the filament back and lift the nozzle by `lift` mm.
@@ -514,6 +544,7 @@ mod tests {
                 })
                 .collect(),
             island: Some(0),
+            slopes: false,
         }
     }
 

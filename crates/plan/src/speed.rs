@@ -58,6 +58,9 @@ const BED: usize = 1;
 /// The lift.
 const LIFT: usize = 2;
 
+/// The nozzle along its path.
+const PATH: usize = 3;
+
 /// Share of a limit that is used. Positions are rounded before they come here; what is left is the
 /// rounding of `F`, and readers who measure an arc by its chord.
 const USED_SHARE: f64 = 0.99;
@@ -181,6 +184,29 @@ fn distances(leg: &Leg, travel: &Travel) -> [f64; AXES] {
     [travel.axes[0], travel.axes[1], travel.lift, leg.path]
 }
 
+/// The limits, and how fast the nozzle may be sped up in each leg, mm/s²: where nothing is said, as fast
+/// as the machine can.
+struct Law<'a> {
+    limits: &'a Limits,
+    accelerations: &'a [f64],
+}
+
+impl Law<'_> {
+    /// The acceleration of an axis in a leg.
+    fn of(&self, axis: usize, leg: usize) -> f64 {
+        let limit = self.limits.axes[axis].acceleration;
+        match self.accelerations.get(leg) {
+            Some(wanted) if axis == PATH => limit.min(wanted * USED_SHARE),
+            _ => limit,
+        }
+    }
+
+    /// The acceleration of an axis between a leg and the next.
+    fn between(&self, axis: usize, leg: usize) -> f64 {
+        self.of(axis, leg).min(self.of(axis, leg + 1))
+    }
+}
+
 /// Returns the duration of every leg, s, and the pace of the last.
 #[must_use]
 pub(crate) fn durations(
@@ -189,16 +215,29 @@ pub(crate) fn durations(
     before: Pace,
     limits: &Limits,
 ) -> (Vec<f64>, Pace) {
+    gentle_durations(legs, travels, before, limits, &[])
+}
+
+/// Like [`durations`], where the nozzle is to be sped up no faster than is said of each leg, mm/s².
+#[must_use]
+pub(crate) fn gentle_durations(
+    legs: &[Leg],
+    travels: &[Travel],
+    before: Pace,
+    limits: &Limits,
+    accelerations: &[f64],
+) -> (Vec<f64>, Pace) {
+    let law = Law { limits, accelerations };
     let moves: Vec<[f64; AXES]> =
         legs.iter().zip(travels).map(|(leg, travel)| distances(leg, travel)).collect();
     let mut durations: Vec<f64> =
         legs.iter().zip(&moves).map(|(leg, axes)| at_speed(leg, axes, limits)).collect();
     let mut direction = before.direction;
     if limits.stops_to_turn_back {
-        direction = stop_to_turn_back(&mut durations, &moves, direction, limits);
+        direction = stop_to_turn_back(&mut durations, &moves, direction, &law);
     }
     if limits.polar {
-        keep_accelerations(&mut durations, &moves, before, limits);
+        keep_accelerations(&mut durations, &moves, before, &law);
     }
     let last = match (moves.last(), durations.last()) {
         (Some(axes), Some(&duration)) => {
@@ -229,7 +268,7 @@ fn stop_to_turn_back(
     durations: &mut [f64],
     moves: &[[f64; AXES]],
     before: f64,
-    limits: &Limits,
+    law: &Law<'_>,
 ) -> f64 {
     let mut direction = before;
     for i in 0..durations.len() {
@@ -239,36 +278,36 @@ fn stop_to_turn_back(
         direction = -direction;
         // The last move of a run ends at rest anyhow.
         for k in i.saturating_sub(1)..=i {
-            durations[k] = durations[k].max(from_rest(&moves[k], limits));
+            durations[k] = durations[k].max(from_rest(k, &moves[k], law));
         }
     }
     direction
 }
 
 /// The least duration of a move that begins or ends at rest.
-fn from_rest(axes: &[f64; AXES], limits: &Limits) -> f64 {
-    let needed = |k: usize| slowed(axes[k], 0.0, 0.0, limits.axes[k].acceleration);
+fn from_rest(leg: usize, axes: &[f64; AXES], law: &Law<'_>) -> f64 {
+    let needed = |k: usize| slowed(axes[k], 0.0, 0.0, law.of(k, leg));
     (0..AXES).map(needed).fold(0.0, f64::max)
 }
 
-fn keep_accelerations(durations: &mut [f64], moves: &[[f64; AXES]], before: Pace, limits: &Limits) {
+fn keep_accelerations(durations: &mut [f64], moves: &[[f64; AXES]], before: Pace, law: &Law<'_>) {
     // Pairs of neighbours of which one changed since they were found to agree; most never change.
     let mut open = vec![true; durations.len().saturating_sub(1)];
     for _ in 0..MOST_PASSES {
-        let mut changed = join_on(before, durations, moves, limits);
+        let mut changed = join_on(before, durations, moves, law);
         if let Some(first) = open.first_mut().filter(|_| changed) {
             *first = true;
         }
         for i in 0..open.len() {
-            changed |= look_again(i, &mut open, durations, moves, limits);
+            changed |= look_again(i, &mut open, durations, moves, law);
         }
-        let rests = come_to_rest(durations, moves, limits);
+        let rests = come_to_rest(durations, moves, law);
         if let Some(last) = open.last_mut().filter(|_| rests) {
             *last = true;
         }
         changed |= rests;
         for i in (0..open.len()).rev() {
-            changed |= look_again(i, &mut open, durations, moves, limits);
+            changed |= look_again(i, &mut open, durations, moves, law);
         }
         if !changed {
             return;
@@ -282,12 +321,12 @@ fn look_again(
     open: &mut [bool],
     durations: &mut [f64],
     moves: &[[f64; AXES]],
-    limits: &Limits,
+    law: &Law<'_>,
 ) -> bool {
     if !open[i] {
         return false;
     }
-    let changed = agree(i, durations, moves, limits);
+    let changed = agree(i, durations, moves, law);
     open[i] = changed;
     if changed {
         let neighbours = i.saturating_sub(1)..=(i + 1).min(open.len() - 1);
@@ -297,13 +336,13 @@ fn look_again(
 }
 
 /// Makes the first move agree with what ran before it, which can no longer change.
-fn join_on(before: Pace, durations: &mut [f64], moves: &[[f64; AXES]], limits: &Limits) -> bool {
+fn join_on(before: Pace, durations: &mut [f64], moves: &[[f64; AXES]], law: &Law<'_>) -> bool {
     let (Some(duration), Some(axes)) = (durations.first_mut(), moves.first()) else {
         return false;
     };
     let mut changed = false;
     for (k, &distance) in axes.iter().enumerate() {
-        let acceleration = limits.axes[k].acceleration;
+        let acceleration = law.of(k, 0);
         let excess = |duration: f64| {
             let between = f64::midpoint(before.duration, duration);
             (distance / duration - before.speeds[k]).abs() / (between * acceleration)
@@ -324,21 +363,22 @@ fn join_on(before: Pace, durations: &mut [f64], moves: &[[f64; AXES]], limits: &
 
 /// Makes the last move slow enough to be followed by anything: what comes next, often a retraction
 /// that should be fast, can then keep its speed.
-fn come_to_rest(durations: &mut [f64], moves: &[[f64; AXES]], limits: &Limits) -> bool {
+fn come_to_rest(durations: &mut [f64], moves: &[[f64; AXES]], law: &Law<'_>) -> bool {
+    let last = durations.len().saturating_sub(1);
     let (Some(duration), Some(axes)) = (durations.last_mut(), moves.last()) else {
         return false;
     };
-    let needed = from_rest(axes, limits);
+    let needed = from_rest(last, axes, law);
     let changed = needed > *duration * (1.0 + SLACK);
     *duration = duration.max(needed);
     changed
 }
 
 /// Makes moves `i` and `i + 1` agree; returns whether anything changed.
-fn agree(i: usize, durations: &mut [f64], moves: &[[f64; AXES]], limits: &Limits) -> bool {
+fn agree(i: usize, durations: &mut [f64], moves: &[[f64; AXES]], law: &Law<'_>) -> bool {
     let mut changed = false;
-    for (k, limit) in limits.axes.iter().enumerate() {
-        let acceleration = limit.acceleration;
+    for k in 0..AXES {
+        let acceleration = law.between(k, i);
         let distances = [moves[i][k], moves[i + 1][k]];
         let between = f64::midpoint(durations[i], durations[i + 1]);
         // Both sides of `change of speed <= acceleration * time`, times both durations.

@@ -12,7 +12,8 @@ use machine::profile::Printer;
 use crate::resample::Leg;
 use crate::speed::Travel;
 
-/// Returns the time of a run of moves that begins and ends at rest, s.
+/// Returns the time of a run of moves that begins and ends at rest, s; `accelerations` (mm/s²) are those
+/// of the nozzle that are wanted in each leg, as far as there are any.
 #[must_use]
 pub(crate) fn estimate(
     legs: &[Leg],
@@ -20,6 +21,7 @@ pub(crate) fn estimate(
     durations: &[f64],
     printer: &Printer,
     space: Space,
+    accelerations: &[f64],
 ) -> f64 {
     let limits = Limits::of(printer, space);
     let mut before: Option<&Leg> = None;
@@ -27,14 +29,16 @@ pub(crate) fn estimate(
         .iter()
         .zip(travels)
         .zip(durations)
-        .map(|((leg, travel), &duration)| {
+        .enumerate()
+        .map(|(k, ((leg, travel), &duration))| {
             let from = before.replace(leg);
             let axes = match (space, from) {
                 (Space::Part, Some(from)) => [leg.at.x - from.at.x, leg.at.y - from.at.y],
                 (Space::Part, None) => [0.0; 2],
                 (Space::Joints | Space::IdealPlane, _) => travel.axes,
             };
-            Ramp::new(leg, axes, travel.lift, duration, &limits)
+            let wanted = accelerations.get(k).copied().unwrap_or(f64::INFINITY);
+            Ramp::new(leg, axes, travel.lift, duration, &limits.gentle(wanted))
         })
         .collect();
     // Square of the speed at which each move is entered; the last entry is the end.
@@ -72,6 +76,13 @@ impl Limits {
             axes: [rail.0, other.0],
             jerks: [rail.1, other.1],
         }
+    }
+}
+
+impl Limits {
+    /// The same where the nozzle is sped up no faster than `path`, mm/s².
+    fn gentle(&self, path: f64) -> Self {
+        Self { path: self.path.min(path), ..*self }
     }
 }
 
@@ -150,7 +161,7 @@ mod tests {
             travels.push(Travel { axes: [length, 0.0], lift: 0.0 });
         }
         let durations: Vec<f64> = lengths.iter().map(|l| l.abs() / speed).collect();
-        estimate(&legs, &travels, &durations, &printer(), Space::Joints)
+        estimate(&legs, &travels, &durations, &printer(), Space::Joints, &[])
     }
 
     #[test]

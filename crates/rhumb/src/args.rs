@@ -324,6 +324,9 @@ pub struct Slice {
     /// Write the mesh exactly as it was sliced
     #[arg(long, value_name = "FILE.stl")]
     pub export_placed: Option<PathBuf>,
+    /// Write the program in part coordinates, too, for viewers
+    #[arg(long, value_name = "FILE.gcode")]
+    pub preview_gcode: Option<PathBuf>,
     /// How much work it may be
     #[command(flatten)]
     pub effort: Effort,

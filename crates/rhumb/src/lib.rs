@@ -47,6 +47,7 @@ pub mod input;
 pub mod interrupt;
 pub mod levels;
 pub mod models;
+pub mod objects;
 pub mod output;
 pub mod overhang;
 pub mod page;

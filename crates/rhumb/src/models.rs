@@ -8,6 +8,7 @@ use std::path::Path;
 
 use geom::bounding::Bounds;
 use geom::circle::{Circle, smallest_around};
+use geom::region::Region;
 use mesh::health::{Health, solid_from_soup};
 use mesh::mesh::Mesh;
 use mesh::model::{self, Format, Given};
@@ -18,6 +19,7 @@ use mesh::topology::Solid;
 use nalgebra::{Point2, Rotation3, Vector2, Vector3};
 
 use crate::failure::Failure;
+use crate::objects::{Object, hull, outline, overlap};
 use crate::place::{Placed, Pose, Wish, place, whole_places};
 
 /// A file of a model.
@@ -102,20 +104,23 @@ fn unusable(class: &'static str, error: &dyn std::error::Error, hint: Option<Str
 
 /// Lays several solids down, each as is wished, and puts them on the bed together, as one solid. The
 /// place that is wished for the first is that of the middle of all. Two that overlap as far as their
-/// boxes tell are told, counted from 1.
+/// outlines from above tell are told, counted from 1.
 ///
 /// # Errors
 ///
 /// As [`place`].
 pub fn arrange(
-    solids: Vec<(Solid, Wish)>,
+    solids: Vec<(String, Solid, Wish)>,
     arrangement: &Arrangement,
     orient: &OrientParams,
 ) -> Result<(Placed, Option<[usize; 2]>), Failure> {
     let mut parts = Vec::new();
-    let aside = solids.first().map_or(Point2::origin(), |(_, wish)| wish.centre);
-    for (solid, wish) in solids {
+    let aside = solids.first().map_or(Point2::origin(), |(_, _, wish)| wish.centre);
+    let (mut names, mut rests) = (Vec::new(), Vec::new());
+    for (name, solid, wish) in solids {
         let part = place(solid, &Wish { centre: Point2::origin(), ..wish }, orient)?;
+        names.extend(std::iter::repeat_n(name, arrangement.copies));
+        rests.extend(std::iter::repeat_n(part.rest, arrangement.copies));
         parts.extend(std::iter::repeat_n((part.solid, part.reach), arrangement.copies));
     }
     let centres = if arrangement.at.is_empty() {
@@ -125,31 +130,59 @@ pub fn arrange(
         arrangement.at.clone()
     };
     let mut all = Mesh::default();
-    let mut boxes = Vec::with_capacity(parts.len());
+    let mut parts_of = Vec::with_capacity(parts.len());
     for ((part, _), centre) in parts.into_iter().zip(centres) {
         let first = all.vertices.len() as u32;
         let aside = Vector3::new(centre.x + aside.x, centre.y + aside.y, 0.0);
         let mesh = part.into_mesh();
         all.vertices.extend(mesh.vertices.iter().map(|p| p + aside));
-        boxes.push(Bounds::of(&all.vertices[first as usize..]));
+        parts_of.push((first as usize..all.vertices.len(), all.triangles.len()));
         all.triangles.extend(mesh.triangles.iter().map(|corners| corners.map(|v| v + first)));
     }
     let azimuth = whole_places(reference_azimuth(&all));
     let reach = all.vertices.iter().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
     let placement = Placement { rotation: Rotation3::identity(), shift: Vector3::zeros() };
-    let placed = Placed { solid: Solid::new(all), placement, rest: None, azimuth, reach };
-    Ok((placed, overlapping(&boxes)))
+    let (outlines, overlap) = outlines(&all, &parts_of);
+    let objects = names.into_iter().zip(outlines);
+    let objects = objects.map(|(name, outline)| Object { name, outline }).collect();
+    let solid = Solid::new(all);
+    Ok((Placed { solid, placement, rest: None, azimuth, reach, objects, rests }, overlap))
 }
 
-/// Two parts, counted from 1, of which each reaches into the box around the other.
-fn overlapping(boxes: &[Bounds]) -> Option<[usize; 2]> {
-    let overlap = |a: &Bounds, b: &Bounds| {
-        (0..3).all(|k| a.min[k] < b.max[k] - TOUCHING_MM && b.min[k] < a.max[k] - TOUCHING_MM)
+/// The outlines of parts, seen from above, each given by its vertices and its first triangle, and two of
+/// them, counted from 1, that overlap. A part whose box no other reaches into has the hull of its outline.
+fn outlines(
+    all: &Mesh,
+    parts: &[(std::ops::Range<usize>, usize)],
+) -> (Vec<Region>, Option<[usize; 2]>) {
+    let boxes: Vec<Bounds> =
+        parts.iter().map(|(vertices, _)| Bounds::of(&all.vertices[vertices.clone()])).collect();
+    let meets = |a: &Bounds, b: &Bounds| {
+        (0..2).all(|k| a.min[k] < b.max[k] - TOUCHING_MM && b.min[k] < a.max[k] - TOUCHING_MM)
     };
-    boxes.iter().enumerate().find_map(|(j, b)| {
-        let i = boxes[..j].iter().position(|a| overlap(a, b))?;
-        Some([i + 1, j + 1])
-    })
+    let ends = parts.iter().skip(1).map(|(_, first)| *first).chain([all.triangles.len()]);
+    let outlines: Vec<Region> = parts
+        .iter()
+        .zip(ends)
+        .enumerate()
+        .map(|(i, ((vertices, first), end))| {
+            let offset = vertices.start as u32;
+            let part = Mesh {
+                vertices: all.vertices[vertices.clone()].to_vec(),
+                triangles: all.triangles[*first..end]
+                    .iter()
+                    .map(|corners| corners.map(|v| v - offset))
+                    .collect(),
+            };
+            let others = boxes.iter().enumerate().filter(|(j, _)| *j != i);
+            let is_alone = others.into_iter().all(|(_, other)| !meets(&boxes[i], other));
+            if is_alone { hull(&part) } else { outline(&part) }
+        })
+        .collect();
+    let pairs = (0..parts.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
+    let mut near = pairs.filter(|(i, j)| meets(&boxes[*i], &boxes[*j]));
+    let found = near.find(|(i, j)| overlap(&outlines[*i], &outlines[*j]));
+    (outlines, found.map(|(i, j)| [i + 1, j + 1]))
 }
 
 /// The pose of models for which the user wants none: flat, but objects that have places with regard

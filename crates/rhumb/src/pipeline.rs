@@ -9,13 +9,15 @@ use std::path::Path;
 
 use geom::bounding::Bounds;
 use machine::gcode::Emitter;
+use machine::gcode::label::Labels;
 use machine::program::Step;
 use mesh::health::Health;
 use mesh::mesh::Mesh;
 use mesh::model::Format;
 use mesh::note::Note;
 use mesh::topology::Solid;
-use nalgebra::Rotation3;
+use nalgebra::{Point3, Rotation3};
+use plan::objects::Objects;
 use plan::planner::{Planner, Totals};
 use slicer::layer::{Filled, Floating};
 use slicer::level::Level;
@@ -28,6 +30,7 @@ use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::levels::{Layout, check_cuts};
 use crate::models::{self, Arrangement, Model};
+use crate::objects::Object;
 use crate::output;
 use crate::overhang::{Overhang, overhangs};
 use crate::place::{Fit, Placed, Pose, Wish, check_envelope, check_size, place, suspect_units};
@@ -130,7 +133,7 @@ pub fn slice_all(
     warnings.extend(placement_warnings(&given, &placed, fit, job));
     warnings.extend(overlap.map(|[a, b]| Warning {
         code: "ModelsOverlap".to_owned(),
-        message: format!("parts {a} and {b} overlap where they stand, as far as their boxes tell"),
+        message: format!("models {a} and {b} overlap where they stand, seen from above"),
     }));
     let orient_ms = clock.lap();
 
@@ -153,9 +156,12 @@ pub fn slice_all(
     let mut text = Emitter::for_printer(out, job.dialect, &job.printer);
     // On a bed that turns no side is the front: the picture is that of the upright part, too.
     let thumbnail = Thumbnail::draw(&upright);
-    program_text::head(&mut text, request.name, request.made_at, &thumbnail, &job.start)
+    let start = start_with_objects(&placed, &job, &mut text);
+    program_text::head(&mut text, request.name, request.made_at, &thumbnail, &start)
         .map_err(written)?;
-    let mut printed = layers(&upright, &stages, &job, &mut text, watch)?;
+    let outlines = placed.objects.iter().map(|object| object.outline.clone()).collect();
+    let objects = Objects { outlines };
+    let mut printed = layers(&upright, &stages, &objects, &job, &mut text, watch)?;
     for (_, island) in &mut printed.floating {
         island.at = turned.inverse() * island.at;
     }
@@ -220,7 +226,23 @@ fn time_of(
     job.plan.resample.azimuth = placed.azimuth;
     let mut nobody = std::io::sink();
     let mut text = Emitter::for_printer(&mut nobody as &mut dyn Write, job.dialect, &job.printer);
-    Ok(layers(upright, &stages, &job, &mut text, watch)?.totals.time)
+    Ok(layers(upright, &stages, &Objects::default(), &job, &mut text, watch)?.totals.time)
+}
+
+/// The start program, and after it which objects there are, where there are several and they are told.
+fn start_with_objects(
+    placed: &Placed,
+    job: &Job,
+    text: &mut Emitter<&mut dyn Write>,
+) -> Vec<String> {
+    let mut start = job.start.clone();
+    if let Some(words) = job.labels.filter(|_| placed.objects.len() > 1) {
+        let labels = Labels::new(words, placed.objects.iter().map(|object| object.name.as_str()));
+        let hulls: Vec<_> = placed.objects.iter().map(Object::hull).collect();
+        start.extend(labels.definitions(&hulls));
+        text.label(labels);
+    }
+    start
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "the shape that map_err calls")]
@@ -286,12 +308,19 @@ struct Printed {
 fn layers(
     solid: &Solid,
     stages: &[Stage],
+    objects: &Objects,
     job: &Job,
     text: &mut Emitter<&mut dyn Write>,
     watch: &mut Watch<'_>,
 ) -> Result<Printed, Failure> {
     let mut printed = Printed::default();
     let mut planner = Planner::new(&job.printer, job.plan);
+    if job.tells_progress {
+        planner = planner.telling_time();
+    }
+    if objects.outlines.len() > 1 && job.labels.is_some() {
+        planner = planner.with_objects(objects.clone());
+    }
     let count: usize = stages.iter().map(|stage| stage.printed.len()).sum();
     watch.progress.stage("slice", count as u64);
     for (index, stage) in stages.iter().enumerate() {
@@ -316,7 +345,8 @@ fn layers(
                 }
                 filled.paths.index = printed.levels.len();
                 printed.count(&filled, &stage.levels[k]);
-                let steps = planner.layer(&filled.paths).map_err(|error| {
+                let normal = |p: &Point3<f64>| stage.normal(k, p);
+                let steps = planner.layer_on(&filled.paths, normal).map_err(|error| {
                     Failure::new("OutOfEnvelope", error.to_string())
                         .hint("move the part off the axis with --place, or correct the calibration")
                 })?;
@@ -368,14 +398,15 @@ fn load(
         let (solid, health) = models::repaired(&given, model.name)?;
         let is_usual = wish.pose == Pose::Usual;
         let pose = if is_usual { models::usual_pose(given.objects) } else { wish.pose };
-        solids.push((solid, Wish { pose, ..wish }));
+        let name = model.name.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        solids.push((name, solid, Wish { pose, ..wish }));
         healths.push((model.name, health));
     }
     let health = models::together(healths, arrangement.copies);
     let repair_ms = clock.lap();
     watch.progress.stage("orient", 1);
     let is_one = solids.len() == 1 && arrangement.copies == 1 && arrangement.at.is_empty();
-    let (given, (placed, overlap)) = if is_one && let Some((solid, wish)) = solids.pop() {
+    let (given, (placed, overlap)) = if is_one && let Some((_, solid, wish)) = solids.pop() {
         (solid.mesh().bounds(), (place(solid, &wish, &job.orient)?, None))
     } else {
         (Bounds::default(), models::arrange(solids, arrangement, &job.orient)?)
@@ -394,7 +425,8 @@ fn nothing_to_print(layers: usize, job: &Job) -> Failure {
     Failure::new(
         "NothingToPrint",
         format!(
-            "no bead fits in any of the {layers} layers; the part is thinner than {} mm everywhere",
+            "no bead fits in any of the {layers} layers; all that is in them is narrower than {} mm or \
+             shorter than a bead is wide",
             job.paths.thin.least_width
         ),
     )

@@ -12,6 +12,7 @@ use mesh::topology::Solid;
 use nalgebra::{Point2, Point3, Rotation3, Vector3};
 
 use crate::failure::Failure;
+use crate::objects::Object;
 use crate::settings::Job;
 
 /// How the model is laid down.
@@ -128,6 +129,10 @@ pub struct Placed {
     pub azimuth: f64,
     /// Farthest point from the rotation axis, mm.
     pub reach: f64,
+    /// The models, where there are several; what each rests on is in the same order.
+    pub objects: Vec<Object>,
+    /// What each of several models rests on.
+    pub rests: Vec<Option<Rest>>,
 }
 
 /// Lays a solid down and puts it in its place. The solid is taken, so that a mesh of millions is
@@ -173,7 +178,8 @@ pub fn place(solid: Solid, wish: &Wish, orient: &OrientParams) -> Result<Placed,
         solid = solid.into_moved(|p| p + aside);
     }
     let reach = solid.mesh().vertices.iter().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
-    Ok(Placed { solid, placement, rest, azimuth, reach })
+    let (objects, rests) = (Vec::new(), Vec::new());
+    Ok(Placed { solid, placement, rest, azimuth, reach, objects, rests })
 }
 
 /// What a cut leaves of a part that stands on the bed.

@@ -19,7 +19,7 @@ use std::ops::Range;
 use mesh::flats::Facing;
 use mesh::mesh::Mesh;
 use mesh::topology::Solid;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use slicer::clearance::{LayerOrder, Uphill, steepest_slope};
 use slicer::level::Level;
 use slicer::lift::LEAST_WEDGE_SHARE;
@@ -98,6 +98,15 @@ pub struct Stage {
 }
 
 impl Stage {
+    /// Returns the unit normal of the upper side of a layer, upwards.
+    #[must_use]
+    pub fn normal(&self, k: usize, p: &Point3<f64>) -> Vector3<f64> {
+        match self.morph.as_ref().and_then(|sides| sides.get(k + 1)) {
+            Some(side) => side.cone.normal(p),
+            None => self.surface.normal(p),
+        }
+    }
+
     /// What the curved layers of this stage are to a planar layer on top of them; `None` for other
     /// stages.
     pub(crate) fn stair(&self, first: &Level) -> Option<Stair<'_>> {

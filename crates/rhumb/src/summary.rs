@@ -265,6 +265,10 @@ fn heights(report: &Report, job: &Job) -> String {
 }
 
 fn resting(outcome: &Outcome) -> String {
+    let rests = &outcome.placed.rests;
+    if !rests.is_empty() {
+        return resting_together(rests);
+    }
     match outcome.placed.rest {
         None => "in the pose that was asked for".into(),
         Some(Rest::Flat(best)) => {
@@ -274,5 +278,21 @@ fn resting(outcome: &Outcome) -> String {
             "as in the file: the largest flat face has only {} % of its surface",
             decimal(largest_share * 100.0, 1)
         ),
+    }
+}
+
+/// How several models lie.
+fn resting_together(rests: &[Option<Rest>]) -> String {
+    let n_flat = rests.iter().filter(|rest| matches!(rest, Some(Rest::Flat(_)))).count();
+    let n_asked = rests.iter().filter(|rest| rest.is_none()).count();
+    let all = rests.len();
+    if n_flat == all {
+        format!("{all} models, each resting on its largest flat face")
+    } else if n_asked == all {
+        format!("{all} models, in the pose that was asked for")
+    } else if n_flat == 0 && n_asked == 0 {
+        format!("{all} models, as in their files: none has a large flat face")
+    } else {
+        format!("{all} models, {n_flat} of them resting on their largest flat faces")
     }
 }

@@ -66,6 +66,11 @@ pub struct LayerMark {
 /// How a comment says that the next layer climbs.
 const CLIMBS: &str = " spiral vase";
 
+/// How a comment says that a wall begins and ends in a slope, and that it is done.
+const SLOPES: &str = " scarf seam";
+
+const SLOPES_END: &str = " scarf seam done";
+
 /// A temperature commanded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heating {
@@ -106,6 +111,7 @@ pub struct Replay {
     height: Option<f64>,
     family: Option<Family>,
     climbs: bool,
+    slopes: bool,
     role: Role,
     width: f64,
 }
@@ -129,6 +135,7 @@ impl Replay {
             height: None,
             family: None,
             climbs: false,
+            slopes: false,
             role: Role::Custom,
             width: 0.0,
         }
@@ -292,6 +299,7 @@ impl Replay {
                 _ => Feed::mm_per_s(speed),
             },
             duration,
+            slopes: self.slopes,
             is_paced,
         }
     }
@@ -327,6 +335,7 @@ impl Replay {
             self.width = number(width).unwrap_or(self.width);
         } else if comment == "LAYER_CHANGE" {
             (self.top, self.height) = (None, None);
+            self.slopes = false;
         } else if let Some(top) = comment.strip_prefix("Z:") {
             self.top = number(top);
         } else if let Some(height) = comment.strip_prefix("HEIGHT:") {
@@ -338,6 +347,8 @@ impl Replay {
             return Event::Layer(LayerMark { line, index, top, height, family, climbs });
         } else if comment == CLIMBS {
             self.climbs = true;
+        } else if comment == SLOPES || comment == SLOPES_END {
+            self.slopes = comment == SLOPES;
         } else if let Some(family) = Family::from_comment(comment) {
             self.family = Some(family);
         }

@@ -54,6 +54,9 @@ pub struct Segment {
     pub feed: Feed,
     /// How long it takes at that speed, s; zero when nothing moves or no speed was given.
     pub duration: f64,
+    /// Whether it is part of a wall that begins and ends in a slope, as announced: it may lie as low as
+    /// its layer begins, and be as thin as nothing.
+    pub slopes: bool,
     /// Whether the firmware runs some of it at a pace of its own, whatever `F` says, and itself sees
     /// to what bed and carriage can follow.
     pub is_paced: bool,

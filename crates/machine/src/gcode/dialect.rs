@@ -6,6 +6,7 @@
 
 use nalgebra::Point3;
 
+use super::label::LabelWords;
 use super::marlin::Marlin;
 use super::number::{decimal, quantum, value};
 use super::speed_word::{SpeedWord, Way};
@@ -171,6 +172,41 @@ impl Dialect {
             "klipper-polar" => Some(format!("SET_PRESSURE_ADVANCE ADVANCE={value}")),
             "rrf-polar" | "rrf-direct" => Some(format!("M572 D0 S{value}")),
             "marlin-polar" => Some(format!("M900 K{value}")),
+            _ => None,
+        }
+    }
+
+    /// Returns the command that bounds the acceleration of what follows, mm/s²; `None` where no firmware
+    /// of this dialect has one.
+    #[must_use]
+    pub fn acceleration(&self, mm_per_s2: f64) -> Option<String> {
+        let value = decimal(mm_per_s2, 0);
+        match self.name {
+            "klipper-polar" | "marlin-polar" | "cartesian" => Some(format!("M204 S{value}")),
+            "rrf-polar" | "rrf-direct" => Some(format!("M204 P{value} T{value}")),
+            _ => None,
+        }
+    }
+
+    /// Returns how firmwares of this dialect are told which lines belong to which object; comments for
+    /// print servers where none takes a command for it.
+    #[must_use]
+    pub fn label_words(&self) -> LabelWords {
+        match self.name {
+            "klipper-polar" => LabelWords::ExcludeObject,
+            "rrf-polar" | "rrf-direct" | "marlin-polar" => LabelWords::M486,
+            _ => LabelWords::Comments,
+        }
+    }
+
+    /// Returns the command that tells the share of the print that is done and the minutes left; `None`
+    /// where no firmware of this dialect has one.
+    #[must_use]
+    pub fn progress(&self, percent: u32, minutes: u64) -> Option<String> {
+        match self.name {
+            "klipper-polar" | "rrf-polar" | "rrf-direct" | "marlin-polar" | "cartesian" => {
+                Some(format!("M73 P{percent} R{minutes}"))
+            }
             _ => None,
         }
     }

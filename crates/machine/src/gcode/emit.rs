@@ -9,6 +9,7 @@ use std::io::{self, Write};
 
 use super::correction::Correction;
 use super::dialect::{DEGREE_DECIMALS, Dialect, MM_DECIMALS, NEAR_AXIS_DECIMALS, Quantity};
+use super::label::Labels;
 use super::number::{decimal, push_quantum, quantum, value};
 use super::speed_word::Way;
 use crate::profile::Printer;
@@ -25,6 +26,9 @@ const FEED_DECIMALS: usize = 1;
 
 /// Decimal places of small inverse times: 0.0001/min is 0.1 % for a move of ten minutes.
 const INVERSE_TIME_DECIMALS: usize = 4;
+
+/// How a program says how long it has taken so far; Cura's words, which print servers read.
+pub const ELAPSED: &str = ";TIME_ELAPSED:";
 
 const DEGREES_IN_A_TURN: f64 = 360.0;
 
@@ -49,6 +53,9 @@ pub struct Emitter<W> {
     /// Filament that rounding has kept back so far, mm.
     filament_owed: f64,
     bead: Option<(Role, i64)>,
+    labels: Option<Labels>,
+    /// The object that the lines belong to.
+    object: Option<usize>,
     lines: usize,
 }
 
@@ -68,6 +75,8 @@ impl<W: Write> Emitter<W> {
             feed: 0,
             filament_owed: 0.0,
             bead: None,
+            labels: None,
+            object: None,
             lines: 0,
         }
     }
@@ -90,6 +99,12 @@ impl<W: Write> Emitter<W> {
             Step::Layer(layer) => self.layer(layer),
             Step::Bead(role, width) => self.bead(*role, *width),
             Step::Fan(share) => self.fan(*share),
+            Step::Object(object) => self.object(*object),
+            Step::Elapsed(seconds) => self.text(&format!("{ELAPSED}{}", decimal(*seconds, 1))),
+            Step::Acceleration(wanted) => match self.dialect.acceleration(*wanted) {
+                Some(words) => self.text(&words),
+                None => Ok(()),
+            },
             Step::Remark(text) => self.comment(text),
             Step::Custom(line) => self.custom(line),
         }
@@ -119,6 +134,11 @@ impl<W: Write> Emitter<W> {
     /// that `RepRapFirmware` does not take them for the height of the part.
     pub fn leave_part(&mut self) {
         self.leaves = true;
+    }
+
+    /// Tells which lines belong to which object from here on.
+    pub fn label(&mut self, labels: Labels) {
+        self.labels = Some(labels);
     }
 
     /// Returns the number of lines written.
@@ -330,6 +350,17 @@ impl<W: Write> Emitter<W> {
         }
         self.bead = Some((role, width));
         Ok(())
+    }
+
+    fn object(&mut self, object: Option<usize>) -> io::Result<()> {
+        let Some(labels) = &self.labels else { return Ok(()) };
+        let end = self.object.map(|last| labels.end(last));
+        let begin = object.map(|next| labels.begin(next));
+        if object == self.object {
+            return Ok(());
+        }
+        self.object = object;
+        end.into_iter().chain(begin).try_for_each(|line| self.text(&line))
     }
 
     fn fan(&mut self, share: f64) -> io::Result<()> {

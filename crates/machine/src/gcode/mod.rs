@@ -3,12 +3,13 @@
 mod correction;
 pub mod dialect;
 mod emit;
+pub mod label;
 pub mod marlin;
 mod number;
 mod parse;
 pub mod speed_word;
 
 pub use dialect::Dialect;
-pub use emit::{Emitter, MOST_COLUMNS, printable};
+pub use emit::{ELAPSED, Emitter, MOST_COLUMNS, printable};
 pub use number::decimal;
 pub use parse::{Code, Command, Line, SyntaxError, parse_line};

@@ -34,7 +34,7 @@ impl Files {
                 .reads(&a.models)
                 .reads_settings(&a.settings)
                 .writes([&slice::target(a)])
-                .writes(a.report.iter().chain(&a.export_placed)),
+                .writes(a.report.iter().chain(&a.export_placed).chain(&a.preview_gcode)),
             Command::Orient(a) => {
                 files.reads([&a.model]).reads_settings(&a.settings).writes(&a.output)
             }

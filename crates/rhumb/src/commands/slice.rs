@@ -1,14 +1,16 @@
 //! `rhumb slice`: the main job.
 
-use std::io::{BufReader, BufWriter, IsTerminal, Write};
+use std::io::{BufRead, BufReader, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
+use machine::gcode::dialect::CARTESIAN;
+use machine::gcode::{Dialect, ELAPSED};
 use mesh::model::Format;
 use slicer::level::Snap;
 use twin::verify::Verdict;
 
 use super::{DONE, LOOK, display_name, say, say_json, settings, to_json, wish};
-use crate::args::{Manner, Proof, Slice};
+use crate::args::{Manner, Proof, SettingsArguments, Slice};
 use crate::calibration;
 use crate::check::{check, refusal};
 use crate::clock;
@@ -44,6 +46,7 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     let beside = |path: &Option<PathBuf>| path.as_deref().map(|p| Output::create(p, &inputs));
     let report_file = beside(&arguments.report).transpose()?;
     let placed_file = beside(&arguments.export_placed).transpose()?;
+    let preview_file = beside(&arguments.preview_gcode).transpose()?;
 
     let mut progress: Box<dyn Progress> = if manner.quiet || !std::io::stderr().is_terminal() {
         Box::new(Silent)
@@ -56,7 +59,7 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
         .map(|(name, bytes)| Model { name, format: Format::of(name, bytes), bytes })
         .collect();
     let name = names(&inputs);
-    let mut outcome = {
+    let (mut outcome, preview_file) = {
         let mut text = BufWriter::with_capacity(1 << 16, out.file());
         let request = Request {
             model: &[],
@@ -71,7 +74,13 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
             .map_err(|failure| about_model(failure, &inputs))?;
         outcome.warnings.extend(calibration::warning(&job.printer));
         text.flush().map_err(|error| output::failed(&target, &error))?;
-        outcome
+        drop(text);
+        if job.tells_progress {
+            out = with_progress(&out, &target, &inputs, outcome.totals.time, &job.dialect)?;
+        }
+        let seen = Seen { request: &request, models: &models, arrangement: &arrangement };
+        let shown = preview_file.map(|file| preview(&seen, &wanted, file, watch)).transpose()?;
+        (outcome, shown)
     };
     drop(bytes);
     let verdict = if arguments.effort.no_verify {
@@ -99,11 +108,77 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     if let Some(file) = placed_file {
         fill(file, &mesh::stl::write(pipeline::part(&outcome)))?;
     }
+    if let Some(file) = preview_file {
+        file.commit()?;
+    }
     out.commit()?;
     tell(&report, &outcome, verdict.as_ref(), &job, &target, manner)?;
     let misses_flats = job.schedule.snap != Snap::Off && outcome.layout.missed().next().is_some();
     let needs_a_look = !report.verify.findings.is_empty() || outcome.health.guessed || misses_flats;
     Ok(if needs_a_look { LOOK } else { DONE })
+}
+
+/// The program with what is done and left put behind every line that says how long it has taken so far.
+fn with_progress(
+    plain: &Output,
+    target: &Path,
+    inputs: &[&Path],
+    total: f64,
+    dialect: &Dialect,
+) -> Result<Output, Failure> {
+    let mut told = Output::create(target, inputs)?;
+    let mut from = BufReader::new(plain.reread()?);
+    let mut to = BufWriter::with_capacity(1 << 16, told.file());
+    let fail = |error| output::failed(target, &error);
+    let (mut line, mut last) = (Vec::new(), None);
+    while from.read_until(b'\n', &mut line).map_err(fail)? > 0 {
+        to.write_all(&line).map_err(fail)?;
+        if let Some(now) = elapsed(&line) {
+            let done = (100.0 * now / total).clamp(0.0, 100.0) as u32;
+            let left = ((total - now).max(0.0) / 60.0).round() as u64;
+            if last.replace((done, left)) != Some((done, left))
+                && let Some(words) = dialect.progress(done, left)
+            {
+                writeln!(to, "{words}").map_err(fail)?;
+            }
+        }
+        line.clear();
+    }
+    to.flush().map_err(fail)?;
+    drop(to);
+    Ok(told)
+}
+
+/// The seconds of a line that says how long the print has taken.
+fn elapsed(line: &[u8]) -> Option<f64> {
+    let seconds = line.strip_prefix(ELAPSED.as_bytes())?;
+    std::str::from_utf8(seconds).ok()?.trim_end().parse().ok()
+}
+
+/// What was sliced.
+struct Seen<'a> {
+    request: &'a Request<'a>,
+    models: &'a [Model<'a>],
+    arrangement: &'a Arrangement,
+}
+
+/// The same in part coordinates.
+fn preview(
+    seen: &Seen<'_>,
+    wanted: &SettingsArguments,
+    mut file: Output,
+    watch: &mut Watch<'_>,
+) -> Result<Output, Failure> {
+    let mut wanted = wanted.clone();
+    wanted.dialect = Some(CARTESIAN.name.to_owned());
+    let (settings, mut job) = settings(&wanted)?;
+    job.most_cuts = seen.request.job.most_cuts;
+    let request = Request { settings: &settings, job: &job, ..*seen.request };
+    let mut text = BufWriter::with_capacity(1 << 16, file.file());
+    pipeline::slice_all(&request, seen.models, seen.arrangement, &mut text, watch)?;
+    text.flush().map_err(|error| output::failed(Path::new("preview"), &error))?;
+    drop(text);
+    Ok(file)
 }
 
 /// Where the program goes: `MODEL.gcode` in the working folder unless the user says.

@@ -138,6 +138,7 @@ impl Foreign {
             filament: stroke.filament,
             feed: Feed::mm_per_s(stroke.speed),
             duration: if stroke.speed > 0.0 { way / stroke.speed } else { 0.0 },
+            slopes: false,
             is_paced: false,
         }
     }

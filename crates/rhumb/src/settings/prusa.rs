@@ -155,7 +155,7 @@ fn value(
             told(&number.to_string())
         }
         // Fans run at so many per cent, without a sign for it.
-        Kind::Share(..) if written == "max_fan_speed" => told(&format!("{}%", first(raw))),
+        Kind::Share(..) if written.ends_with("fan_speed") => told(&format!("{}%", first(raw))),
         Kind::Share(..) | Kind::Switch => told(first(raw)),
         Kind::Choice(_) => told(raw),
         Kind::Text => {

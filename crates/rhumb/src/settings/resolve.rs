@@ -4,17 +4,20 @@ use geom::tolerance::Tolerances;
 use machine::drive::{Drive, Drives, Transmission};
 use machine::gcode::Dialect;
 use machine::gcode::dialect::Space;
+use machine::gcode::label::LabelWords;
 use machine::height_map::HeightMap;
 use machine::kinematics::{Alignment, BedScale};
 use machine::profile::{Axis, NozzleShape, Printer, Turntable};
 use machine::program::{BedTurn, Joints};
 use mesh::flats::FlatParams;
 use mesh::orient::OrientParams;
+use plan::acceleration::Accelerations;
 use plan::cooling::CoolingParams;
 use plan::order::OrderParams;
 use plan::planner::{HeatParams, PlanParams};
 use plan::resample::ResampleParams;
 use plan::route::{FilamentParams, Speeds};
+use plan::scarf::{ScarfParams, ScarfPlacement};
 use plan::seam::SeamPosition;
 use slicer::adhesion::AdhesionParams;
 use slicer::clearance::NozzleProfile;
@@ -77,6 +80,10 @@ pub struct Job {
     pub drives: Drives,
     /// What turns the bed, for its lag.
     pub bed_drive: BedDrive,
+    /// How lines of several objects are told apart, if they are.
+    pub labels: Option<LabelWords>,
+    /// Whether the program tells how far it is.
+    pub tells_progress: bool,
     /// Most cuts of a facet by a layer; not a setting of the print, but of how long to work for it.
     pub most_cuts: f64,
     /// Program before the print.
@@ -151,12 +158,22 @@ impl Job {
                 gear_ratio: get.number("bed_gear_ratio"),
                 inertia: get.number("bed_inertia_kg_m2"),
             },
+            labels: labels(&get, &dialect),
+            tells_progress: get.switch("remaining_times") && dialect.progress(0, 0).is_some(),
             most_cuts: MOST_CUTS,
             start: start(&get, &dialect, settings)?,
             end: template::fill(get.text("end_gcode"), "end_gcode", settings)?,
             printer,
             dialect,
         })
+    }
+}
+
+fn labels(get: &Lookup<'_>, dialect: &Dialect) -> Option<LabelWords> {
+    match get.text("gcode_label_objects") {
+        "disabled" => None,
+        "octoprint" => Some(LabelWords::Comments),
+        _ => Some(dialect.label_words()),
     }
 }
 
@@ -551,6 +568,8 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
             dialect,
             azimuth: 0.0,
         },
+        accelerations: accelerations(get),
+        scarf: scarf(get),
         cooling: CoolingParams {
             least_layer_time: get.number("slowdown_below_layer_time_s"),
             least_speed: get.number("min_print_speed_mm_per_s"),
@@ -560,9 +579,43 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
             temperature: get.number("temperature_c"),
             fan: get.number("fan_speed"),
             bridge_fan: get.number("bridge_fan_speed"),
+            least_fan: get.number("min_fan_speed"),
+            short_layer: get.number("slowdown_below_layer_time_s"),
+            long_layer: get.number("fan_below_layer_time_s"),
             layers_without_fan: get.count("disable_fan_first_layers"),
+            full_fan_layer: get.count("full_fan_speed_layer"),
         },
         curved,
+    }
+}
+
+fn accelerations(get: &Lookup<'_>) -> Accelerations {
+    let of = |what: &str| get.number(&format!("{what}_acceleration_mm_per_s2"));
+    Accelerations {
+        external_perimeter: of("external_perimeter"),
+        perimeter: of("perimeter"),
+        infill: of("infill"),
+        solid_infill: of("solid_infill"),
+        top_solid_infill: of("top_solid_infill"),
+        bridge: of("bridge"),
+        first_layer: of("first_layer"),
+        travel: of("travel"),
+        usual: of("default"),
+    }
+}
+
+fn scarf(get: &Lookup<'_>) -> ScarfParams {
+    ScarfParams {
+        placement: match get.text("scarf_seam_placement") {
+            "contours" => ScarfPlacement::Contours,
+            "everywhere" => ScarfPlacement::Everywhere,
+            _ => ScarfPlacement::Nowhere,
+        },
+        inner: get.switch("scarf_seam_on_inner_perimeters"),
+        start: get.number("scarf_seam_start_height"),
+        length: get.number("scarf_seam_length_mm"),
+        entire: get.switch("scarf_seam_entire_loop"),
+        piece: get.number("scarf_seam_max_segment_length_mm"),
     }
 }
 

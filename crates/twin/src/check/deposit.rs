@@ -130,6 +130,10 @@ impl Deposit {
         let [from, to] = &segment.part;
         if self.family == Family::Planar {
             let off = (from.z - self.top).abs().max((to.z - self.top).abs());
+            // What begins or ends in a slope lies within the layer, beside the same outline.
+            if segment.slopes && exceeds(off, rounding::IN_PLANE) {
+                return;
+            }
             self.is_sound = !exceeds(off, rounding::IN_PLANE);
         }
         let middle = segment.middle(&self.alignment);

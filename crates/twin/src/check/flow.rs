@@ -121,6 +121,8 @@ impl Flow {
         let [least, most] = match self.ground {
             // The first turn of a vase begins without thickness.
             _ if mark.climbs => [0.0, THICKEST],
+            // As thin as nothing where a slope begins or ends.
+            _ if segment.slopes => [0.0, THICKEST],
             _ if !is_planar => [THINNEST, THICKEST],
             Some(ground) => {
                 [THINNEST, THICKEST / ground.normal(&segment.middle(&self.alignment)).z]
@@ -141,7 +143,7 @@ impl Flow {
         }
         // The width that ironing is announced with is rounded by a tenth of it.
         let is_told = segment.role != Role::Ironing;
-        let is_told_plane = is_planar && self.ground.is_none() && !mark.climbs;
+        let is_told_plane = is_planar && self.ground.is_none() && !mark.climbs && !segment.slopes;
         let role = Role::ALL.iter().position(|role| *role == segment.role && is_told);
         if let Some(role) = role.filter(|_| is_told_plane && share.is_finite()) {
             let class = (share.min(THICKEST) / CLASS) as usize;

@@ -13,6 +13,9 @@
 //! multiple of it where curved layers pass beside the part and are left out. The first layer lies
 //! its thickness above the bed.
 //!
+//! Walls that begin and end in a slope, as announced, lie within their layer: at most its thickness
+//! below its surface.
+//!
 //! A program that announces its surfaces (see [`crate::family`]) claims all this, and what is found
 //! is an error. Of others it is a warning: a wall that climbs in a helix is printed on purpose.
 
@@ -53,6 +56,8 @@ pub(crate) struct Surface {
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     line: usize,
+    /// How much lower than its layer it may lie, mm.
+    lower: f64,
     at: Point3<f64>,
     level: f64,
 }
@@ -85,10 +90,11 @@ impl Surface {
         let family = mark.family.unwrap_or_default();
         let line = segment.line;
         let tip = if let Family::Conical { .. } = family { self.tip } else { 0.0 };
+        let lower = if segment.slopes { mark.height.unwrap_or_default() } else { 0.0 };
         let mut sample = |at: Point3<f64>| {
             // Written so that what is not a number is judged.
             if !(tip > 0.0 && at.x.hypot(at.y) < tip) {
-                self.samples.push(Sample { line, at, level: family.level(&at) });
+                self.samples.push(Sample { line, lower, at, level: family.level(&at) });
             }
         };
         sample(segment.part[0]);
@@ -109,7 +115,8 @@ impl Surface {
             return;
         }
         for sample in &self.samples {
-            let off = (sample.level - level).abs() * family.thickness_per_level(&sample.at);
+            let off = (sample.level - level) * family.thickness_per_level(&sample.at);
+            let off = if off < 0.0 { (-off - sample.lower).max(0.0) } else { off };
             if exceeds(off, OFF) {
                 let place =
                     Place { line: sample.line, layer: Some(mark.index), at: Some(sample.at) };

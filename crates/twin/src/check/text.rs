@@ -25,11 +25,18 @@ const GENERAL: [u32; 7] = [4, 21, 28, 90, 92, 93, 94];
 
 /// The `M` commands that a program may have: extruder relative (83), motors off (18, 84), heaters
 /// and fans, progress and messages (73, 117), waiting for moves to end (400), filament ahead of its flow
-/// (572, 900).
-const MACHINE: [u32; 14] = [18, 73, 83, 84, 104, 106, 107, 109, 117, 140, 190, 400, 572, 900];
+/// (572, 900), accelerations (204), objects (486).
+const MACHINE: [u32; 16] =
+    [18, 73, 83, 84, 104, 106, 107, 109, 117, 140, 190, 204, 400, 486, 572, 900];
 
 /// The commands by name that a program may have: Klipper's own, which move nothing.
-const NAMED: [&str; 2] = ["SET_PRESSURE_ADVANCE", "SET_PRINT_STATS_INFO"];
+const NAMED: [&str; 5] = [
+    "SET_PRESSURE_ADVANCE",
+    "SET_PRINT_STATS_INFO",
+    "EXCLUDE_OBJECT_DEFINE",
+    "EXCLUDE_OBJECT_START",
+    "EXCLUDE_OBJECT_END",
+];
 
 /// Judges lines as they stand.
 #[derive(Debug, Clone, Copy)]

@@ -23,7 +23,8 @@ const BEHIND: f64 = 0.25;
 pub fn curve_svg(points: &[Point3<f64>], radius: f64, title: &str) -> String {
     let mut canvas = Canvas::new(2.0 * VIEW + 3.0 * MARGIN, VIEW + 3.0 * MARGIN);
     // Each view: right, up and towards the eye.
-    let views: [(&str, fn(&Point3<f64>) -> [f64; 3]); 2] =
+    type View = (&'static str, fn(&Point3<f64>) -> [f64; 3]);
+    let views: [View; 2] =
         [("from above", |p| [p.x, p.y, p.z]), ("from the side, -y", |p| [p.x, p.z, -p.y])];
     for (k, (name, seen)) in views.into_iter().enumerate() {
         let centre = [MARGIN + VIEW / 2.0 + k as f64 * (VIEW + MARGIN), MARGIN + VIEW / 2.0];

@@ -101,7 +101,28 @@ pub(super) const KEYS: &[Key] = &[
         "filament pushed ahead of its flow, for each mm/s of its speed; told to the firmware before the \
          print, 0 leaves it as it is",
     ),
-    share(Material, "fan_speed", 1.0, "part fan"),
+    share(Material, "fan_speed", 1.0, "part fan, of layers that take little time"),
+    share(
+        Material,
+        "min_fan_speed",
+        1.0,
+        "part fan of layers that take long, where that is less than fan_speed",
+    ),
+    number(
+        Material,
+        "fan_below_layer_time_s",
+        "fan_below_layer_time",
+        (60.0, 0.0, 1000.0),
+        "layers that take this long have min_fan_speed; from there to slowdown_below_layer_time_s the fan \
+         is turned up to fan_speed",
+    ),
+    count(
+        Material,
+        "full_fan_speed_layer",
+        (0, 0, 1000),
+        "layer, counted from 1, at which the fan comes to its full speed, evenly from \
+         disable_fan_first_layers on; 0 for at once",
+    ),
     share(
         Material,
         "bridge_fan_speed",

@@ -337,6 +337,22 @@ pub(super) const KEYS: &[Key] = &[
         (0.005, 0.001, 0.5),
         "what the lift moves by; layer heights are whole multiples of it, unless snap = off",
     ),
+    Key {
+        name: "remaining_times",
+        section: Printer,
+        kind: Kind::Switch,
+        default: Default::Switch(false),
+        program_name: "remaining_times",
+        meaning: "whether the program tells the firmware what share is done and how many minutes are \
+                  left (M73), where it has a command for that",
+    },
+    choice(
+        Printer,
+        "gcode_label_objects",
+        &["firmware", "octoprint", "disabled"],
+        "how lines of several models are told apart, so that one can be left out: by the firmware's own \
+         commands where it has them (EXCLUDE_OBJECT, M486), by comments for OctoPrint, or not",
+    ),
     text(
         Printer,
         "start_gcode",

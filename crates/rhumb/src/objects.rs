@@ -1,0 +1,61 @@
+//! Several models on one bed, seen from above.
+
+use geom::circle::convex_hull;
+use geom::grid::mm;
+use geom::region::{Fill, Region};
+use mesh::mesh::Mesh;
+use nalgebra::{Point2, Rotation2};
+
+/// One of several models, where it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Object {
+    /// What it is called.
+    pub name: String,
+    /// Its outline from above, part frame, or, where no other model reaches into the box around it,
+    /// the hull of it.
+    pub outline: Region,
+}
+
+impl Object {
+    /// Returns the corners of its hull.
+    #[must_use]
+    pub fn hull(&self) -> Vec<Point2<f64>> {
+        let corners: Vec<Point2<f64>> =
+            self.outline.rings().flatten().map(|corner| mm(*corner)).collect();
+        convex_hull(&corners)
+    }
+}
+
+/// Returns the hull of a mesh, seen from above.
+#[must_use]
+pub fn hull(mesh: &Mesh) -> Region {
+    let corners: Vec<Point2<f64>> = mesh.vertices.iter().map(|p| p.xy()).collect();
+    Region::from_rings([convex_hull(&corners).as_slice()], Fill::NonZero)
+}
+
+/// Returns what a closed mesh covers, seen from above.
+#[must_use]
+pub fn outline(mesh: &Mesh) -> Region {
+    // What looks up covers as much as all together, and is wound one way.
+    let facets =
+        mesh.triangles.iter().map(|corners| corners.map(|v| mesh.vertices[v as usize].xy()));
+    let looks_up = |[a, b, c]: &[Point2<f64>; 3]| (b - a).perp(&(c - a)) > 0.0;
+    let facets: Vec<[Point2<f64>; 3]> = facets.filter(looks_up).collect();
+    Region::from_rings(facets.iter().map(<[_; 3]>::as_slice), Fill::NonZero)
+}
+
+/// Area that two outlines may share and still only touch, mm²: the corners of a part lie on a grid.
+const TOUCHING_MM2: f64 = 1e-3;
+
+/// Returns whether two outlines share an area.
+#[must_use]
+pub fn overlap(a: &Region, b: &Region) -> bool {
+    a.intersection(b).area() > TOUCHING_MM2
+}
+
+/// Returns corners turned about the axis.
+#[must_use]
+pub fn turned(corners: &[Point2<f64>], angle: f64) -> Vec<Point2<f64>> {
+    let turn = Rotation2::new(angle);
+    corners.iter().map(|corner| turn * corner).collect()
+}
