@@ -129,6 +129,18 @@ pub enum Unreachable {
         /// mm.
         max: f64,
     },
+    /// A head that turns the nozzle cannot stand so.
+    #[error("the {what} would be {value:.3}{unit}, the head allows {limit:.3}{unit}")]
+    Head {
+        /// What is beyond its bound.
+        what: &'static str,
+        /// In `unit`.
+        value: f64,
+        /// The bound.
+        limit: f64,
+        /// The unit, with what stands before it.
+        unit: &'static str,
+    },
     /// One line winds further round the axis than the wires of the bed allow.
     #[error("the bed would have to turn {turns:.1} times from home, its wires allow {most}")]
     WoundUp {

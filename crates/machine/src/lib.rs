@@ -4,7 +4,7 @@
 //! part into joint positions and back, with the machine's own misalignment. [`program`] is the
 //! motion program in joints, and [`gcode`] writes it as text in the words of a firmware and reads
 //! text back. [`height_map`], [`backlash`] and [`plate_shift`] are corrections that stand beside the
-//! kinematics. [`drive`] is what turns pulses into motion. [`calibration`] finds the misalignment of a real machine.
+//! kinematics, and [`head`] is for nozzles that tilt or stand on legs. [`drive`] is what turns pulses into motion. [`calibration`] finds the misalignment of a real machine.
 //!
 //! This crate knows neither meshes nor slicing: it must stay useful alone, for calibration.
 
@@ -12,6 +12,7 @@ pub mod backlash;
 pub mod calibration;
 pub mod drive;
 pub mod gcode;
+pub mod head;
 pub mod height_map;
 pub mod kinematics;
 pub mod plate_shift;
