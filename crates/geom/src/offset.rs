@@ -18,7 +18,7 @@ mod moved_sides;
 
 use nalgebra::{Point2, Vector2};
 
-use crate::grid::{GridPoint, STEPS_PER_MM};
+use crate::grid::{GridPoint, STEPS_PER_MM, mm};
 use crate::region::{Fill, Region, Ring, signed_area};
 
 pub use moved_sides::{MovedSides, ShortSides};
@@ -88,9 +88,47 @@ impl Region {
 
     fn raw_rings(&self, shift: f64, arcs: &Arcs, short_sides: ShortSides) -> Vec<Ring> {
         debug_assert!(shift.is_finite());
-        let shift = shift * STEPS_PER_MM;
-        self.rings().map(|ring| raw_ring(ring, shift, arcs, short_sides)).collect()
+        let in_steps = shift * STEPS_PER_MM;
+        let rings = match short_sides {
+            ShortSides::Loop => self.rings().collect(),
+            ShortSides::LeftOut => lasting_rings(self, shift),
+        };
+        rings.into_iter().map(|ring| raw_ring(ring, in_steps, arcs, short_sides)).collect()
     }
+}
+
+/// Returns the rings of a region without those of which nothing is left when its border moves
+/// inwards by `shift` (mm; outwards when negative): islands too small for it, or holes that close.
+///
+/// The raw rings of such places cross themselves many times, only to bound nothing.
+#[must_use]
+pub fn lasting_rings(region: &Region, shift: f64) -> Vec<&Ring> {
+    let islands = region.islands().iter();
+    if shift > 0.0 {
+        return islands.filter(|island| !vanishes(island, shift)).flatten().collect();
+    }
+    let stays = |hole: &&Ring| !vanishes(std::slice::from_ref(*hole), -shift);
+    islands.flat_map(|island| island[..1].iter().chain(island[1..].iter().filter(stays))).collect()
+}
+
+/// Returns whether an island, or a hole alone, is plainly too small to hold a disc of `radius` (mm):
+/// it is no wider, or has less area. `false` says nothing.
+///
+/// True of charts too, where no line is longer and no disc smaller than the chart shows it.
+#[must_use]
+pub fn vanishes(island: &[Ring], radius: f64) -> bool {
+    let Some(outer) = island.first() else { return true };
+    let mut points = outer.iter().map(|&p| mm(p));
+    let Some(first) = points.next() else { return true };
+    let (min, max) = points.fold((first, first), |(min, max), p| (min.inf(&p), max.sup(&p)));
+    let size = max - min;
+    if size.x.min(size.y) <= 2.0 * radius {
+        return true;
+    }
+    // Hardly any ring is so small that its area need be told.
+    let disc = std::f64::consts::PI * radius * radius;
+    size.x * size.y < 4.0 * disc
+        && island.iter().map(|ring| signed_area(ring)).sum::<f64>().abs() < 0.99 * disc
 }
 
 /// How corners are rounded whose moved sides drift apart.
@@ -315,6 +353,30 @@ mod tests {
         );
         assert!(square(10.0).inset(5.001).is_empty());
         assert!((square(10.0).inset(4.9).area() - 0.04).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_holds_no_disc_vanishes_and_nothing_else() {
+        let circle = |radius: f64| {
+            let point = |k: u32| {
+                let (sin, cos) = (f64::from(k) * TAU / 64.0).sin_cos();
+                [radius * cos, radius * sin]
+            };
+            region(&[(0..64).map(point).collect()])
+        };
+        let vanishes = |region: &Region, radius| vanishes(&region.islands()[0], radius);
+        assert!(vanishes(&circle(0.39), 0.4) && !vanishes(&circle(0.41), 0.4));
+        // As wide as the disc, but a triangle; long, but too narrow.
+        let triangle = region(&[vec![[0.0, 0.0], [0.9, 0.0], [0.45, 0.9]]]);
+        assert!(vanishes(&triangle, 0.4) && triangle.inset(0.4).is_empty());
+        assert!(vanishes(&region(&[vec![[0.0, 0.0], [9.0, 0.0], [9.0, 0.7], [0.0, 0.7]]]), 0.4));
+        // Moved inwards a small island goes, moved outwards a small hole does.
+        let plate = square(9.0).difference(&region(&[vec![[4.0, 4.0], [4.5, 4.0], [4.2, 4.5]]]));
+        assert_eq!(lasting_rings(&plate, 0.4).len(), 2);
+        assert_eq!(lasting_rings(&plate, -0.4).len(), 1);
+        assert_eq!(plate.outset(0.4), square(9.0).outset(0.4));
+        let both = plate.union(&region(&[vec![[20.0, 0.0], [20.5, 0.0], [20.2, 0.5]]]));
+        assert_eq!((lasting_rings(&both, 0.4).len(), lasting_rings(&both, 0.1).len()), (2, 3));
     }
 
     #[test]

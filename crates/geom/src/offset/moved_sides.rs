@@ -121,6 +121,12 @@ impl MovedSides {
         self.from[side] <= self.to[side]
     }
 
+    /// Returns whether no side has its ends in the wrong order.
+    #[must_use]
+    pub fn all_fit(&self) -> bool {
+        (0..self.from.len()).all(|side| self.fits(side))
+    }
+
     /// Returns whether both sides at a corner fit: a kept side and the kept one before it.
     #[must_use]
     pub fn fit_around(&self, side: usize) -> bool {

@@ -20,7 +20,8 @@
 
 use geom::grid::{GridPoint, STEPS_PER_MM, mm, snap};
 use geom::offset::{
-    ARC_TOLERANCE_MM, LEAST_SINE, LONGEST_MITER, MovedSides, OPENING_TOLERANCE_MM, ShortSides,
+    ARC_TOLERANCE_MM, LEAST_SINE, LONGEST_MITER, MovedSides, OPENING_TOLERANCE_MM, lasting_rings,
+    vanishes,
 };
 use geom::polyline::{distance_to_segment, share_nearest};
 use geom::region::{Fill, Island, Region, Ring, ring_length, signed_area};
@@ -76,10 +77,22 @@ impl Chart {
         if self.is_flat() {
             return region.inset_with_loss(distance);
         }
-        let looped = self.raw_rings(region, distance, &EXACT, ShortSides::Loop);
-        let enclosed: f64 = looped.iter().map(|ring| signed_area(ring)).sum();
-        let inset = self.shifted(region, distance, &EXACT);
-        let lost = inset.area() - enclosed;
+        let mover = Mover { chart: self, shift: distance, curves: &EXACT };
+        let (mut raw, mut lost) = (Vec::new(), 0.0);
+        for island in region.islands() {
+            if vanishes(island, distance) {
+                lost += island.iter().map(|ring| signed_area(ring)).sum::<f64>();
+                continue;
+            }
+            for ring in island {
+                let mut border = Border::new(&mover, ring);
+                let looped = border.raw_ring();
+                lost -= signed_area(&looped);
+                raw.push(if border.leave_out_short() { border.raw_ring() } else { looped });
+            }
+        }
+        let inset = resolved(&raw);
+        let lost = lost + inset.area();
         (inset, lost)
     }
 
@@ -88,23 +101,26 @@ impl Chart {
         if region.is_empty() || shift == 0.0 {
             return region.clone();
         }
-        let raw = self.raw_rings(region, shift, curves, ShortSides::LeftOut);
-        let moved = Region::from_grid_rings(&raw, Fill::Positive);
-        if moved.islands().iter().all(|island| is_wider_than_rounding(&island)) {
-            return moved;
-        }
-        moved.filtered(is_wider_than_rounding)
+        let mover = Mover { chart: self, shift, curves };
+        let raw: Vec<Ring> = lasting_rings(region, shift)
+            .into_iter()
+            .map(|ring| {
+                let mut border = Border::new(&mover, ring);
+                border.leave_out_short();
+                border.raw_ring()
+            })
+            .collect();
+        resolved(&raw)
     }
 
-    fn raw_rings(
-        &self,
-        region: &Region,
-        shift: f64,
-        curves: &Curves,
-        short_sides: ShortSides,
-    ) -> Vec<Ring> {
-        debug_assert!(shift.is_finite());
-        region.rings().map(|ring| raw_ring(self, ring, shift, curves, short_sides)).collect()
+    /// The greatest curvature that a straight line of the chart has on the layer at distance
+    /// `from_axis` from the axis, 1/mm; that of its image, moved by less than that, is the like.
+    fn curvature(&self, from_axis: f64) -> f64 {
+        match *self {
+            Self::Plane => 0.0,
+            Self::Cone { cos } => (1.0 / (cos * cos) - 1.0) / (cos * cos * from_axis),
+            Self::Sphere { radius } => 1.0 / radius,
+        }
     }
 
     /// How much the image of a side of 1 mm, moved by 1 mm, may bend away from a chord, mm, at
@@ -121,6 +137,15 @@ impl Chart {
             Self::Sphere { radius } => 1.0 / (4.0 * radius * radius),
         }
     }
+}
+
+/// The places that raw rings wind round a positive number of times.
+fn resolved(raw: &[Ring]) -> Region {
+    let moved = Region::from_grid_rings(raw, Fill::Positive);
+    if moved.islands().iter().all(|island| is_wider_than_rounding(&island)) {
+        return moved;
+    }
+    moved.filtered(is_wider_than_rounding)
 }
 
 /// Whether an island is more than what rounding leaves of strips that lie against each other, as
@@ -167,6 +192,10 @@ const BENT_SIDE_MM: f64 = 1e-3;
 /// Where sides turn by less than this sine, the crossing of their images is that of straight lines
 /// to within a fraction of a grid step.
 const SMALL_TURN: f64 = 0.05;
+
+/// Images that bend by no more than this between corner and crossing, mm, cross where straight lines
+/// would: a fifth of the tolerance of arcs.
+const STRAIGHT_MM: f64 = ARC_TOLERANCE_MM / 5.0;
 
 /// How near to each other two curves count as crossing, mm: a tenth of a grid step.
 const CROSSING_MM: f64 = 1e-6;
@@ -301,27 +330,59 @@ struct Mover<'a> {
     curves: &'a Curves,
 }
 
-/// The raw ring of one ring; `shift` in mm.
-fn raw_ring(
-    chart: &Chart,
-    ring: &[GridPoint],
-    shift: f64,
-    curves: &Curves,
-    short_sides: ShortSides,
-) -> Ring {
-    let mover = Mover { chart, shift, curves };
-    let sides = sides_of(chart, ring, shift);
-    let count = sides.len();
-    let before = |i: usize| &sides[(i + count - 1) % count];
-    let turns: Vec<Turn> = (0..count).map(|i| mover.turn(before(i), &sides[i])).collect();
-    let lengths: Vec<f64> = sides.iter().map(|side| side.length).collect();
-    let lost: Vec<Option<[f64; 2]>> =
-        turns.iter().map(|turn| mover.meet(turn).then_some(turn.consumed)).collect();
-    let mut moved = MovedSides::new(&lengths, &lost);
-    if short_sides == ShortSides::LeftOut {
-        moved.leave_out_short(|one, other| mover.crossing_across(&sides[one], &sides[other]));
+/// A ring, ready to be moved.
+struct Border<'a> {
+    mover: &'a Mover<'a>,
+    sides: Vec<Side>,
+    /// The corner before each side.
+    turns: Vec<Turn>,
+    moved: MovedSides,
+}
+
+impl<'a> Border<'a> {
+    fn new(mover: &'a Mover<'a>, ring: &[GridPoint]) -> Self {
+        let sides = sides_of(mover.chart, ring, mover.shift);
+        let count = sides.len();
+        let turns: Vec<Turn> =
+            (0..count).map(|i| mover.turn(&sides[(i + count - 1) % count], &sides[i])).collect();
+        let lengths: Vec<f64> = sides.iter().map(|side| side.length).collect();
+        let lost: Vec<Option<[f64; 2]>> =
+            turns.iter().map(|turn| mover.meet(turn).then_some(turn.consumed)).collect();
+        let moved = MovedSides::new(&lengths, &lost);
+        Self { mover, sides, turns, moved }
     }
-    let corners_before = |side: usize| -> Vec<Corner> {
+
+    /// Leaves out the sides that are too short to bound anything; returns whether there can be any.
+    fn leave_out_short(&mut self) -> bool {
+        if self.moved.all_fit() {
+            return false;
+        }
+        let Self { mover, sides, moved, .. } = self;
+        moved.leave_out_short(|one, other| mover.crossing_across(&sides[one], &sides[other]));
+        true
+    }
+
+    fn raw_ring(&self) -> Ring {
+        let Self { mover, sides, moved, .. } = self;
+        let places: Vec<(&Side, Vec<Corner>)> =
+            moved.kept().map(|side| (&sides[side], self.corners_before(side))).collect();
+        let mut raw = Ring::with_capacity(sides.len() + sides.len() / 4);
+        for (k, (side, corners)) in places.iter().enumerate() {
+            raw.extend(corners.iter().flat_map(|corner| &corner.points).map(snap));
+            let (_, next) = &places[(k + 1) % places.len()];
+            let (Some(here), Some(next)) = (corners.last(), next.first()) else { continue };
+            let (Some(from), Some(to)) = (here.points.last(), next.points.first()) else {
+                continue;
+            };
+            let range = (here.after, side.length - next.before);
+            mover.side(side, range, (from, to), &mut raw);
+        }
+        raw
+    }
+
+    /// What the raw ring does between a kept side and the kept one before it.
+    fn corners_before(&self, side: usize) -> Vec<Corner> {
+        let Self { mover, sides, turns, moved } = self;
         let both_fit = moved.fit_around(side);
         if both_fit && moved.meets_across(side) {
             let before = moved.before(side);
@@ -331,21 +392,12 @@ fn raw_ring(
                 after: moved.from(side),
             }];
         }
-        let corner = |i: usize| mover.corner(before(i), &sides[i], &turns[i], both_fit);
+        let count = sides.len();
+        let corner = |i: usize| {
+            mover.corner(&sides[(i + count - 1) % count], &sides[i], &turns[i], both_fit)
+        };
         moved.corners(side).map(corner).collect()
-    };
-    let places: Vec<(&Side, Vec<Corner>)> =
-        moved.kept().map(|side| (&sides[side], corners_before(side))).collect();
-    let mut raw = Ring::with_capacity(count + count / 4);
-    for (k, (side, corners)) in places.iter().enumerate() {
-        raw.extend(corners.iter().flat_map(|corner| &corner.points).map(snap));
-        let (_, next) = &places[(k + 1) % places.len()];
-        let (Some(here), Some(next)) = (corners.last(), next.first()) else { continue };
-        let (Some(from), Some(to)) = (here.points.last(), next.points.first()) else { continue };
-        let range = (here.after, side.length - next.before);
-        mover.side(side, range, (from, to), &mut raw);
     }
-    raw
 }
 
 /// A corner in true angles and lengths.
@@ -478,8 +530,13 @@ impl Mover<'_> {
     /// `None` when they do not meet nearby.
     fn crossing(&self, before: &Side, after: &Side, turn: &Turn) -> Option<Corner> {
         let half = self.shift / (1.0 + turn.cos);
-        let is_clear = !self.has_apex() || turn.at.coords.norm() > self.shift.abs();
-        if turn.sin.abs() <= SMALL_TURN && turn.cos > 0.0 && is_clear {
+        let from_axis = turn.at.coords.norm();
+        let is_clear = !self.has_apex() || from_axis > self.shift.abs();
+        let [lost, other] = turn.consumed;
+        let lost = lost.abs().max(other.abs());
+        let is_slight = turn.sin.abs() <= SMALL_TURN && turn.cos > 0.0;
+        let is_straight = || self.chart.curvature(from_axis) * lost * lost <= STRAIGHT_MM;
+        if is_clear && (is_slight || is_straight()) {
             let at = self.walk(&turn.at, &((turn.normals[0] + turn.normals[1]) * half));
             let [before, after] = turn.consumed;
             return Some(Corner { points: vec![at], before, after });
