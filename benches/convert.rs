@@ -106,6 +106,7 @@ fn timed(name: &str, source: &Path, target: &Path, job: &Job, proof: bool) -> Re
         name: "source.gcode",
         origin: Vector2::new(MIDDLE, MIDDLE),
         job,
+        keeps_dangerous: false,
         made_at: "2026-01-31 at 12:00:00",
     };
     let opened = |error: io::Error| Failure::new("Unreadable", error.to_string());

@@ -427,6 +427,10 @@ pub struct Convert {
     /// what is printed
     #[arg(long, value_name = "X,Y|auto", default_value = "0,0", allow_hyphen_values = true)]
     pub origin: String,
+    /// Keep commands that change the machine for good, take a guard away or delete files (such as M92,
+    /// M302, M500, M851)
+    #[arg(long)]
+    pub allow_dangerous: bool,
     /// Do not check the finished program
     #[arg(long)]
     pub no_verify: bool,

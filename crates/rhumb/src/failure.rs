@@ -19,6 +19,7 @@ const CLASSES: &[(&str, u8)] = &[
     ("NumberRange", 4),
     ("NoTriangles", 4),
     ("GcodeSyntax", 4),
+    ("GcodeUnsupported", 4),
     ("LogSyntax", 4),
     ("NoCalibration", 4),
     ("NoVolume", 5),

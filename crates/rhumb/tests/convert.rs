@@ -26,6 +26,7 @@ fn converted(source: &str, job: &Job, origin: [f64; 2]) -> Result<(String, Conve
         name: "source.gcode",
         origin: origin.into(),
         job,
+        keeps_dangerous: false,
         made_at: "2026-01-31 at 12:00:00",
     };
     let mut out = Vec::new();
@@ -273,6 +274,7 @@ fn what_is_written_is_proved_on_its_way() {
         name: "source.gcode",
         origin: Vector2::new(100.0, 100.0),
         job: &job,
+        keeps_dangerous: false,
         made_at: "2026-01-31 at 12:00:00",
     };
     let source = square();

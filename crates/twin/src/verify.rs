@@ -247,6 +247,7 @@ impl<'a> Verifier<'a> {
         let is_mark = |comment: &str| comment.trim_start().starts_with(CONVERTED_FROM);
         if line.comment.is_some_and(is_mark) {
             self.text.is_converted();
+            self.heat.is_converted();
         }
         match &line.command {
             Some(command) => self.command(command, place),

@@ -133,6 +133,10 @@ pub fn parse_line(text: &str) -> Result<Line<'_>, SyntaxError> {
         }
         let (letter, value) = words.next_word_or_switch(!needs_numbers)?;
         let index = usize::from(letter - b'A');
+        // Which of the two holds is for no reader to guess.
+        if needs_numbers && command.given & (1 << index) != 0 {
+            return Err(words.error("the line has this word twice"));
+        }
         command.values[index] = value;
         command.given |= 1 << index;
     }
@@ -254,6 +258,8 @@ impl Words<'_> {
         if may_be_alone && self.peek().is_none_or(|c| c.is_ascii_whitespace()) {
             return Ok((letter, 0.0));
         }
+        // RS274 and firmwares allow blanks between a letter and its number.
+        self.skip_blanks();
         let start = self.at;
         if matches!(self.peek(), Some(b'+' | b'-')) {
             self.at += 1;

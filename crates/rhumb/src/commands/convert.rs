@@ -31,7 +31,9 @@ pub(super) fn run(arguments: &Convert, manner: &Manner) -> Result<u8, Failure> {
     };
     let target = target(arguments);
     let mut out = Output::create(&target, &[arguments.program.as_path()])?;
-    let request = Request { name: &name, origin, job: &job, made_at: &clock::now() };
+    let made_at = clock::now();
+    let keeps_dangerous = arguments.allow_dangerous;
+    let request = Request { name: &name, origin, job: &job, keeps_dangerous, made_at: &made_at };
     let (converted, verdict) = {
         let mut text = BufWriter::with_capacity(1 << 16, out.file());
         let done = if arguments.no_verify {
@@ -106,7 +108,7 @@ fn tell(
     if target == Path::new("-") || manner.quiet && !manner.json {
         return Ok(());
     }
-    let Converted { lines, written, filament, time, left_out, .. } = *converted;
+    let Converted { lines, written, filament, time, left_out, ref concerns, .. } = *converted;
     if manner.json {
         return say_json(&serde_json::json!({
             "lines": lines,
@@ -115,6 +117,12 @@ fn tell(
             "time_s": time,
             "left_out": left_out,
             "slow_flow": slow,
+            "warnings": concerns.iter().map(|concern| serde_json::json!({
+                "code": concern.code,
+                "line": concern.line,
+                "count": concern.count,
+                "message": concern.to_string(),
+            })).collect::<Vec<_>>(),
             "origin_mm": [origin.x, origin.y],
             "verify": verdict.map(|verdict| serde_json::json!({"findings": findings(verdict)})),
         }));
@@ -131,6 +139,9 @@ fn tell(
     }
     if let Some(slow) = slow {
         text.push_str(&format!("slow flow  {slow}\n"));
+    }
+    for concern in concerns {
+        text.push_str(&format!("{concern}\n"));
     }
     for finding in verdict.iter().flat_map(|verdict| &verdict.findings) {
         text.push_str(&format!("{finding}\n"));

@@ -1,15 +1,18 @@
 //! The source, gathered into batches that are planned at once.
 
-use std::borrow::Cow;
-use std::io::{BufRead, Read};
+use std::io::BufRead;
 
 use machine::program::Layer;
-use nalgebra::{Point3, Vector2};
+use nalgebra::Point3;
 use plan::route::{Kind, Stroke};
 
-use super::comment::without_comment;
+use super::Request;
+use super::comment::{leaves_bracket_open, without_comment};
+use super::concern::Concern;
 use super::layers::Layers;
+use super::line::{Line, begin};
 use super::reader::{Meaning, ReadError, Reader, commands};
+use super::watch::Watch;
 use crate::failure::Failure;
 
 /// Strokes that are planned at once, at least; a batch ends where the nozzle stands still anyhow.
@@ -21,15 +24,17 @@ const LONGEST_BATCH: usize = 1 << 15;
 /// Other lines after which a batch ends: a program may have no strokes at all.
 const MOST_OTHERS: usize = 1 << 12;
 
-/// Longest line of a source, bytes.
-const LONGEST_LINE: u64 = 1 << 20;
+/// Bytes of other lines after which a batch ends: each may be long.
+const MOST_BYTES: usize = 1 << 20;
 
 /// What stands between strokes.
 #[derive(Debug)]
 pub(super) enum Between {
     /// A command of the source.
     Command(String),
-    /// The same, which homes the machine; the batch ends with it.
+    /// One that is left out, because it would change the machine for good.
+    Refused(String),
+    /// A command that homes the machine; the batch ends with it.
     Home(String),
     /// What follows a `;`.
     Comment(String),
@@ -48,34 +53,10 @@ pub(super) struct Batch {
     pub(super) between: Vec<(usize, Between)>,
     /// Lines of the source up to the end of this batch.
     pub(super) lines: usize,
-}
-
-/// A line of a source.
-#[derive(Debug, Default)]
-pub(super) struct Line {
-    bytes: Vec<u8>,
-    /// Counted from 1.
-    number: usize,
-}
-
-impl Line {
-    /// Reads the next line; returns whether there is one.
-    pub(super) fn read(&mut self, source: &mut impl BufRead, name: &str) -> Result<bool, Failure> {
-        self.bytes.clear();
-        let count = Read::take(source, LONGEST_LINE)
-            .read_until(b'\n', &mut self.bytes)
-            .map_err(|error| Failure::new("Unreadable", format!("{name}: {error}")))?;
-        self.number += usize::from(count > 0);
-        Ok(count > 0)
-    }
-
-    pub(super) fn text(&self) -> Cow<'_, str> {
-        String::from_utf8_lossy(&self.bytes)
-    }
-
-    pub(super) fn number(&self) -> usize {
-        self.number
-    }
+    /// Bytes that the lines between strokes hold.
+    bytes: usize,
+    /// What a user should know; in the last batch alone.
+    pub(super) concerns: Vec<Concern>,
 }
 
 /// Reads a source batch by batch.
@@ -85,25 +66,27 @@ pub(super) struct Batches<'a, R> {
     home: Point3<f64>,
     reader: Reader,
     layers: Layers,
+    watch: Watch,
     line: Line,
+    has_begun: bool,
     is_done: bool,
 }
 
 impl<'a, R: BufRead> Batches<'a, R> {
-    pub(super) fn new(
-        source: R,
-        name: &'a str,
-        origin: Vector2<f64>,
-        home: Point3<f64>,
-        arc_tolerance: f64,
-    ) -> Self {
+    /// Returns the batches of a source; arcs become lines that stay within `arc_tolerance`.
+    pub(super) fn new(source: R, request: &Request<'a>, arc_tolerance: f64) -> Self {
+        let (job, origin) = (request.job, request.origin);
+        let printer = &job.printer;
+        let home = printer.alignment.part_from_joints(&printer.home);
         Self {
             source,
-            name,
+            name: request.name,
             home,
             reader: Reader::new(origin, home, arc_tolerance),
             layers: Layers::default(),
+            watch: Watch::new(printer, job.plan.filament.area, request.keeps_dangerous),
             line: Line::default(),
+            has_begun: false,
             is_done: false,
         }
     }
@@ -112,15 +95,23 @@ impl<'a, R: BufRead> Batches<'a, R> {
     ///
     /// # Errors
     ///
-    /// `GcodeSyntax` for a line that is none, `Unreadable` when reading fails.
+    /// `EmptyFile`, `WrongFormat` or `Encoding` for what is no program, `GcodeSyntax` for a line that is
+    /// none, `GcodeUnsupported` for a motion that has no polar form, `OutOfEnvelope` for too much heat,
+    /// `Unreadable` when reading fails.
     pub(super) fn next(&mut self) -> Result<Option<Batch>, Failure> {
+        if !std::mem::replace(&mut self.has_begun, true) {
+            begin(&mut self.source, self.name)?;
+        }
         let mut batch = Batch::default();
         while !self.is_done {
             self.is_done = !self.line.read(&mut self.source, self.name)?;
             let goes_home = !self.is_done && self.take(&mut batch)?;
             if self.is_done || goes_home || self.is_full(&batch) {
                 self.layers.give_up();
-                batch.lines = self.line.number;
+                batch.lines = self.line.number();
+                if self.is_done {
+                    batch.concerns = self.watch.concerns();
+                }
                 return Ok(Some(batch));
             }
         }
@@ -130,27 +121,43 @@ impl<'a, R: BufRead> Batches<'a, R> {
     /// Takes the line just read into the batch; returns whether the machine is homed by it.
     fn take(&mut self, batch: &mut Batch) -> Result<bool, Failure> {
         let text = self.line.text();
+        let number = self.line.number();
         let (code, comment) = without_comment(&text);
+        if leaves_bracket_open(&text) {
+            self.watch.open_bracket(&text, number);
+        }
         let mut goes_home = false;
         let mut is_alone = true;
-        let fault = |error: &ReadError| unreadable(self.name, self.line.number, error);
+        let fault = |error: &ReadError| unreadable(self.name, number, error);
         for command in commands(&code).map_err(|error| fault(&error))? {
             is_alone = false;
-            let first = batch.strokes.len();
+            let (first, from) = (batch.strokes.len(), self.reader.at());
+            if self.watch.is_on_card() {
+                self.watch.other(command, number).map_err(|error| fault(&error))?;
+                continue;
+            }
             let meaning =
                 self.reader.line(command, &mut batch.strokes).map_err(|error| fault(&error))?;
-            batch.lines_of.resize(batch.strokes.len(), self.line.number);
+            batch.lines_of.resize(batch.strokes.len(), number);
             match meaning {
                 Meaning::Motion => {
-                    if let Some(stroke) = laid(&batch.strokes[first..]) {
+                    let new = &batch.strokes[first..];
+                    self.watch.moved(from, new, self.reader.has_speed(), (command, number));
+                    if let Some(stroke) = laid(new) {
                         self.layers.laid(stroke.to.z, &mut batch.between);
                     }
                 }
                 Meaning::Absorbed => {}
                 Meaning::Other(line) => {
-                    batch.between.push((first, Between::Command(line.to_owned())));
+                    let goes_over =
+                        self.watch.other(line, number).map_err(|error| fault(&error))?;
+                    let line = line.to_owned();
+                    batch.bytes += line.len();
+                    let kind = if goes_over { Between::Command } else { Between::Refused };
+                    batch.between.push((first, kind(line)));
                 }
                 Meaning::Home(line) => {
+                    self.watch.home(line, number);
                     batch.between.push((first, Between::Home(line.to_owned())));
                     self.reader.homed(self.home);
                     goes_home = true;
@@ -160,10 +167,12 @@ impl<'a, R: BufRead> Batches<'a, R> {
         // Remarks on single moves have no place where moves are cut to pieces, and what the source
         // estimated is not true of this machine.
         let kept = comment.filter(|comment| is_alone && !is_estimate(comment));
-        if let Some(comment) = kept
-            && !self.layers.comment(&comment, batch.strokes.len(), &mut batch.between)
-        {
-            batch.between.push((batch.strokes.len(), Between::Comment(comment.into_owned())));
+        if let Some(comment) = kept {
+            self.watch.comment(&comment, number);
+            if !self.layers.comment(&comment, batch.strokes.len(), &mut batch.between) {
+                batch.bytes += comment.len();
+                batch.between.push((batch.strokes.len(), Between::Comment(comment.into_owned())));
+            }
         }
         Ok(goes_home)
     }
@@ -173,6 +182,7 @@ impl<'a, R: BufRead> Batches<'a, R> {
         batch.strokes.len() >= LONGEST_BATCH
             || batch.strokes.len() >= BATCH && rests && !self.layers.is_open()
             || batch.between.len() >= MOST_OTHERS
+            || batch.bytes >= MOST_BYTES
     }
 }
 
@@ -189,5 +199,5 @@ fn is_estimate(comment: &str) -> bool {
 
 /// Says which line is none.
 pub(super) fn unreadable(name: &str, line: usize, error: &ReadError) -> Failure {
-    Failure::new("GcodeSyntax", format!("{name}, line {line}: {error}"))
+    Failure::new(error.class(), format!("{name}, line {line}: {error}"))
 }

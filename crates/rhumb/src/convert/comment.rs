@@ -10,13 +10,22 @@ pub(super) fn without_comment(line: &str) -> (Cow<'_, str>, Option<Cow<'_, str>>
         Some((code, comment)) => (code, Some(Cow::from(comment))),
         None => (line, None),
     };
-    // A message may have brackets of its own.
-    let is_words = code.trim_start().starts_with(['G', 'g', 'N', 'n', 'X', 'Y', 'Z', '(']);
-    if !is_words || !code.contains('(') {
+    if !is_words(code) || !code.contains('(') {
         return (code.into(), comment);
     }
     let (words, inside) = without_brackets(code);
     (words.into(), comment.or(Some(inside.into())))
+}
+
+/// Whether brackets are comments in this line: a message may have brackets of its own.
+fn is_words(code: &str) -> bool {
+    code.trim_start().starts_with(['G', 'g', 'N', 'n', 'X', 'Y', 'Z', '('])
+}
+
+/// Whether a bracket that begins a comment is not closed in its line.
+pub(super) fn leaves_bracket_open(line: &str) -> bool {
+    let code = line.split_once(';').map_or(line, |(code, _)| code);
+    is_words(code) && code.rfind('(').is_some_and(|at| !code[at..].contains(')'))
 }
 
 /// Returns what stands outside of brackets, and what stands inside, each after a blank.
@@ -51,6 +60,8 @@ mod tests {
         assert_eq!(taken("(only)"), (String::new(), some(" only")));
         assert_eq!(taken("M117 a (b)"), ("M117 a (b)".into(), None));
         assert_eq!(taken(";TYPE:Perimeter"), (String::new(), some("TYPE:Perimeter")));
+        assert!(leaves_bracket_open("G1 X5 (oops E3\n") && leaves_bracket_open("(a) G1 (b"));
+        assert!(!leaves_bracket_open("G1 (a) X5 ; (b") && !leaves_bracket_open("M117 :-("));
         assert_eq!(taken("\u{feff}G28"), ("G28".into(), None));
     }
 }

@@ -5,8 +5,9 @@ use std::io::BufRead;
 use nalgebra::{Point2, Point3, Vector2};
 use plan::route::Kind;
 
-use super::batch::{Line, unreadable};
+use super::batch::unreadable;
 use super::comment::without_comment;
+use super::line::{Line, begin};
 use super::reader::{ReadError, Reader, commands};
 use crate::failure::Failure;
 
@@ -24,6 +25,7 @@ pub fn middle(mut source: impl BufRead, name: &str) -> Result<Vector2<f64>, Fail
     let (mut line, mut strokes) = (Line::default(), Vec::new());
     let mut bounds: Option<[Point2<f64>; 2]> = None;
     let mut has_layers = false;
+    begin(&mut source, name)?;
     while line.read(&mut source, name)? {
         let text = line.text();
         let (code, comment) = without_comment(&text);

@@ -9,11 +9,15 @@
 mod arc;
 mod batch;
 mod comment;
+mod concern;
 mod layers;
+mod line;
 mod middle;
+mod order;
 mod reader;
 mod segments;
 mod tee;
+mod watch;
 
 use std::io::{BufRead, Write};
 use std::path::Path;
@@ -35,6 +39,7 @@ use crate::output;
 use crate::program_text::duration;
 use crate::settings::Job;
 use batch::{Batch, Batches, Between};
+pub use concern::Concern;
 pub use middle::middle;
 use tee::{Chunks, Tee};
 
@@ -48,12 +53,14 @@ pub struct Request<'a> {
     pub origin: Vector2<f64>,
     /// The machine and its words.
     pub job: &'a Job,
+    /// Whether commands that change the machine for good go over.
+    pub keeps_dangerous: bool,
     /// When the program was made, for its first line.
     pub made_at: &'a str,
 }
 
 /// What came of it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Converted {
     /// Lines read.
     pub lines: usize,
@@ -67,6 +74,8 @@ pub struct Converted {
     pub left_out: usize,
     /// What is laid with less flow than the filament should have.
     pub slow_flow: SlowFlow,
+    /// What a user should know of the source, in the order of its lines.
+    pub concerns: Vec<Concern>,
 }
 
 /// Batches on their way from one part of the work to the next.
@@ -79,8 +88,9 @@ const ARC_SHARE: f64 = 0.25;
 ///
 /// # Errors
 ///
-/// `GcodeSyntax` for a line that is none, `OutOfEnvelope` for one that leads out of the machine's
-/// reach, or what reading and writing report.
+/// `EmptyFile`, `WrongFormat` or `Encoding` for what is no program, `GcodeSyntax` for a line that is
+/// none, `GcodeUnsupported` for a motion that has no polar form, `OutOfEnvelope` for one that leads out
+/// of the machine's reach or heats too much, or what reading and writing report.
 pub fn convert(
     request: &Request<'_>,
     source: impl BufRead + Send,
@@ -89,8 +99,7 @@ pub fn convert(
 ) -> Result<Converted, Failure> {
     let job = request.job;
     let chord = job.plan.resample.chord;
-    let home = job.printer.alignment.part_from_joints(&job.printer.home);
-    let mut batches = Batches::new(source, request.name, request.origin, home, chord * ARC_SHARE);
+    let mut batches = Batches::new(source, request, chord * ARC_SHARE);
     let mut planning = Planning::new(request, chord * (1.0 - ARC_SHARE));
     let mut writing = Writing::new(request, out);
     writing.head(request).map_err(written)?;
@@ -237,6 +246,7 @@ impl<'a> Writing<'a> {
             self.other(other)?;
         }
         self.converted.lines = batch.lines;
+        self.converted.concerns.extend(batch.concerns);
         self.converted.time = time;
         // The machine stands still here; not every source says where its layers begin.
         self.text.recount().map_err(written)
@@ -252,14 +262,19 @@ impl<'a> Writing<'a> {
                 Ok(())
             }
             Between::Layer(layer) => self.text.step(&Step::Layer(layer)).map_err(written),
+            Between::Refused(line) => {
+                let start: String = line.chars().take(40).collect();
+                self.text.comment(&format!("left out: {start}")).map_err(written)
+            }
             // Cut short it would be another command.
             Between::Command(line) if line.len() > MOST_COLUMNS || !line.is_ascii() => {
                 self.converted.left_out += 1;
                 let start: String = line.chars().take(40).collect();
                 self.text.comment(&format!("left out: {start}...")).map_err(written)
             }
+            // What terminals obey is no part of a message.
             Between::Command(line) | Between::Home(line) => {
-                self.text.step(&Step::Custom(line)).map_err(written)
+                self.text.step(&Step::Custom(printable(&line))).map_err(written)
             }
         }
     }

@@ -28,7 +28,7 @@ pub(super) enum Meaning<'a> {
 }
 
 /// Why a line cannot be read.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(super) enum ReadError {
     /// It is not a command.
     #[error("{0}")]
@@ -50,6 +50,36 @@ pub(super) enum ReadError {
     /// A curve or a meaning of `F` that no polar firmware has.
     #[error("{0} is not understood")]
     Foreign(&'static str),
+    /// A motion that has no polar form.
+    #[error("{0} moves the machine in a way that is not understood")]
+    ForeignMotion(String),
+    /// A feed rate that never arrives.
+    #[error("F must be above 0, not {0}")]
+    Feed(f64),
+    /// A byte that no firmware reads.
+    #[error("there is a NUL in the line")]
+    Nul,
+    /// A temperature beyond that of the machine.
+    #[error("a {of} temperature of {told} °C; the machine's highest is {most} °C")]
+    TooHot {
+        /// Nozzle or bed.
+        of: &'static str,
+        /// °C.
+        told: f64,
+        /// °C.
+        most: f64,
+    },
+}
+
+impl ReadError {
+    /// The class of failure that it is.
+    pub(super) fn class(&self) -> &'static str {
+        match self {
+            Self::OtherPlane | Self::Foreign(_) | Self::ForeignMotion(_) => "GcodeUnsupported",
+            Self::TooHot { .. } => "OutOfEnvelope",
+            _ => "GcodeSyntax",
+        }
+    }
 }
 
 /// Reads lines; remembers the state that they build on.
@@ -61,6 +91,9 @@ pub(super) struct Reader {
     at: Point3<f64>,
     /// Where the source says that it is, less where it is, mm.
     offset: Vector3<f64>,
+    /// Axes that nothing was said of since homing: the source takes them to be at its zero, wherever
+    /// our machine has its home.
+    is_at_home: [bool; 3],
     /// The source's filament position, mm.
     filament: f64,
     is_relative: bool,
@@ -71,6 +104,7 @@ pub(super) struct Reader {
     unit: f64,
     /// mm/s.
     speed: f64,
+    has_speed: bool,
     /// The motion command in force: 0 to 3.
     motion: u32,
     arc_tolerance: f64,
@@ -89,21 +123,34 @@ impl Reader {
             origin,
             at: home,
             offset: Vector3::new(origin.x, origin.y, 0.0),
+            is_at_home: [true; 3],
             filament: 0.0,
             is_relative: false,
             filament_is_relative: false,
             filament_mode_is_relative: false,
             unit: 1.0,
             speed: FIRST_SPEED_MM_S,
+            has_speed: false,
             motion: 1,
             arc_tolerance,
         }
+    }
+
+    /// Where the nozzle is, mm, as it will be printed.
+    pub(super) fn at(&self) -> Point3<f64> {
+        self.at
+    }
+
+    /// Whether an `F` was read.
+    pub(super) fn has_speed(&self) -> bool {
+        self.has_speed
     }
 
     /// The machine now stands at `home`, and no origin is set.
     pub(super) fn homed(&mut self, home: Point3<f64>) {
         self.at = home;
         self.offset = Vector3::new(self.origin.x, self.origin.y, 0.0);
+        self.is_at_home = [true; 3];
     }
 
     /// Reads one of the [`commands`] of a line and appends the strokes that it asks for.
@@ -113,9 +160,16 @@ impl Reader {
         strokes: &mut Vec<Stroke>,
     ) -> Result<Meaning<'a>, ReadError> {
         let code = code.trim();
+        if code.contains('\0') {
+            return Err(ReadError::Nul);
+        }
         let first = code.bytes().next().unwrap_or(b' ').to_ascii_uppercase();
         let second = code.as_bytes().get(1).copied().unwrap_or(b' ');
         let is_word = second.is_ascii_digit() || b"+-. ".contains(&second);
+        // Marks of the begin and the end of a program.
+        if code == "%" {
+            return Ok(Meaning::Absorbed);
+        }
         if b"XYZEFIJR".contains(&first) && is_word {
             // Words alone go on with the last motion.
             let full = format!("G{} {code}", self.motion);
@@ -141,6 +195,10 @@ impl Reader {
         strokes: &mut Vec<Stroke>,
     ) -> Result<Meaning<'a>, ReadError> {
         let number = match command.code {
+            Code::Numbered(b'G', number, part) if is_foreign_motion(number, part) => {
+                let name = code.split_ascii_whitespace().next().unwrap_or_default();
+                return Err(ReadError::ForeignMotion(name.chars().take(20).collect()));
+            }
             Code::Numbered(b'G', number, 0) => number,
             Code::Numbered(b'M', number, 0) => {
                 self.filament_mode_is_relative = number == 83;
@@ -164,7 +222,6 @@ impl Reader {
                 return Ok(Meaning::Absorbed);
             }
             28 => return Ok(Meaning::Home(code)),
-            5 => return Err(ReadError::Foreign("the curve G5")),
             93 => return Err(ReadError::Foreign("inverse time (G93)")),
             95 => return Err(ReadError::Foreign("feed per turn (G95)")),
             _ => return Ok(Meaning::Other(code)),
@@ -179,6 +236,7 @@ impl Reader {
         for (k, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
             if let Some(value) = command.word(letter) {
                 self.offset[k] = value * self.unit - self.at[k];
+                self.is_at_home[k] = false;
             }
         }
         if let Some(value) = command.word(b'E') {
@@ -191,8 +249,11 @@ impl Reader {
         command: &Command<'_>,
         strokes: &mut Vec<Stroke>,
     ) -> Result<(), ReadError> {
-        if let Some(speed) = command.word(b'F').filter(|speed| *speed > 0.0) {
-            self.speed = speed * self.unit / 60.0;
+        if let Some(speed) = command.word(b'F') {
+            if speed <= 0.0 {
+                return Err(ReadError::Feed(speed));
+            }
+            (self.speed, self.has_speed) = (speed * self.unit / 60.0, true);
         }
         let to = self.target(command);
         let filament = self.fed(command);
@@ -226,12 +287,14 @@ impl Reader {
         Ok(())
     }
 
-    fn target(&self, command: &Command<'_>) -> Point3<f64> {
+    fn target(&mut self, command: &Command<'_>) -> Point3<f64> {
         let mut to = self.at;
         for (k, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
             if let Some(value) = command.word(letter) {
+                let is_at_home = std::mem::replace(&mut self.is_at_home[k], false);
+                let from = if is_at_home { -self.offset[k] } else { self.at[k] };
                 let value = value * self.unit;
-                to[k] = if self.is_relative { self.at[k] + value } else { value - self.offset[k] };
+                to[k] = if self.is_relative { from + value } else { value - self.offset[k] };
             }
         }
         to
@@ -309,6 +372,12 @@ fn numbered(code: &str) -> Result<&str, ReadError> {
     }
 }
 
+/// Curves, direct steps, probing, moves to stored places and drilling cycles: on a polar machine they
+/// would go where nobody meant.
+fn is_foreign_motion(number: u32, part: u32) -> bool {
+    matches!((number, part), (5..=6 | 38 | 61 | 73 | 82..=89, _) | (0..=3, 1..))
+}
+
 fn is_mode_of_filament(code: &str) -> bool {
     let word = code.split_ascii_whitespace().next().unwrap_or_default();
     word.eq_ignore_ascii_case("M82") || word.eq_ignore_ascii_case("M83")
@@ -362,6 +431,13 @@ mod tests {
     }
 
     #[test]
+    fn what_is_relative_to_home_is_relative_to_the_zero_of_the_source() {
+        let (strokes, _) = read("G91\nG1 X110 Y105 Z0.2 F600\nG1 X-5\nG90\nG1 X90");
+        let places: Vec<_> = strokes.iter().map(|s| (s.to.x, s.to.y, s.to.z)).collect();
+        assert_eq!(places, [(10.0, 5.0, 0.2), (5.0, 5.0, 0.2), (-10.0, 5.0, 0.2)]);
+    }
+
+    #[test]
     fn inches_modal_words_numbers_and_checksums() {
         let (strokes, _) =
             read("G20\nG1 X4 Y4 F60\nG21\nX110.05 Y-3\nY90\nN3 G1 X100 Y100*42\nG90 G0 X101");
@@ -409,7 +485,14 @@ mod tests {
         assert!(matches!(line("G1 X5 F"), Err(ReadError::Syntax(_))));
         assert_eq!(line("G2 X5 Y5 F100 I3 J9"), Err(ReadError::NoArc));
         assert_eq!(line("G18"), Err(ReadError::OtherPlane));
-        assert_eq!(line("G5 X5 Y5 I1 J1 P1 Q1"), Err(ReadError::Foreign("the curve G5")));
+        for foreign in ["G5 X5 Y5 I1 J1 P1 Q1", "G5.1 X5", "G6 X5", "G38.2 Z-5", "G61 X", "G83 X1"]
+        {
+            let name = foreign.split(' ').next().unwrap().to_owned();
+            assert_eq!(line(foreign), Err(ReadError::ForeignMotion(name)));
+        }
+        assert_eq!(line("G1 X5 F0"), Err(ReadError::Feed(0.0)));
+        assert!(line("G1 X5 X6").unwrap_err().to_string().contains("twice"));
+        assert!(line("G1 X-2e1 E3").unwrap_err().to_string().contains("twice"));
         assert!(matches!(line("G93"), Err(ReadError::Foreign(_))));
     }
 

@@ -22,6 +22,8 @@ pub(crate) struct Heat {
     /// The temperature that the nozzle certainly has, °C.
     certain: f64,
     bed: f64,
+    /// Whether a converted program has said nothing of heat so far.
+    says_nothing: bool,
 }
 
 impl Heat {
@@ -35,10 +37,14 @@ impl Heat {
             nozzle: 0.0,
             certain: 0.0,
             bed: 0.0,
+            says_nothing: false,
         }
     }
 
     pub(crate) fn nozzle(&mut self, heating: Heating, place: Place, findings: &mut Findings) {
+        if std::mem::take(&mut self.says_nothing) {
+            self.certain = 0.0;
+        }
         self.nozzle = heating.target;
         self.certain =
             if heating.waits { heating.target } else { self.certain.min(heating.target) };
@@ -48,6 +54,12 @@ impl Heat {
     pub(crate) fn bed(&mut self, heating: Heating, place: Place, findings: &mut Findings) {
         self.bed = heating.target;
         range("the bed", heating.target, self.bed_max, place, findings);
+    }
+
+    /// The program was made by somebody who need not heat in it: until it says anything of heat, nobody
+    /// knows how warm the nozzle is.
+    pub(crate) fn is_converted(&mut self) {
+        (self.certain, self.says_nothing) = (f64::INFINITY, true);
     }
 
     /// Something was commanded of which nobody knows whether it heats or cools.
@@ -116,6 +128,20 @@ mod tests {
         }
         check.end(place, &mut findings);
         findings.kept().iter().map(|finding| (finding.measured, finding.limit)).collect()
+    }
+
+    #[test]
+    fn a_converted_program_may_leave_heat_to_its_user_but_not_begin_halfway() {
+        let place = Place::line(1, None);
+        for (heating, n) in [(None, 0), (Some((20.0, true)), 1), (Some((210.0, false)), 1)] {
+            let (mut check, mut findings) = (Heat::new(&printer()), Findings::default());
+            check.is_converted();
+            if let Some((target, waits)) = heating {
+                check.nozzle(Heating { target, waits }, place, &mut findings);
+            }
+            check.segment(&filament_segment(1.0, 5.0), &mut findings);
+            assert_eq!(findings.kept().len(), n, "{heating:?}");
+        }
     }
 
     #[test]
