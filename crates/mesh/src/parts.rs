@@ -26,17 +26,37 @@ pub(crate) fn parts_for(n_items: usize) -> usize {
     n_items.div_ceil(PART).clamp(1, MOST_PARTS)
 }
 
+/// What is dealt: the number of an item, or that with a key, so that whoever works a part need not
+/// fetch its keys from all over memory.
+pub(crate) trait Card: Copy + Default + Send + Sync {
+    /// The item's number.
+    fn item(self) -> u32;
+}
+
+impl Card for u32 {
+    fn item(self) -> u32 {
+        self
+    }
+}
+
+/// A key of 96 bits above the number.
+impl Card for u128 {
+    fn item(self) -> u32 {
+        self as u32
+    }
+}
+
 /// Items `0..n` dealt into parts.
-pub(crate) struct Parts {
-    chunks: Vec<Chunk>,
+pub(crate) struct Parts<C = u32> {
+    chunks: Vec<Chunk<C>>,
     n_parts: usize,
     n_items: usize,
 }
 
 /// The items of one chunk, grouped by part, ascending within a part.
-struct Chunk {
-    items: Vec<u32>,
-    /// Where each part's items begin, and the end.
+struct Chunk<C> {
+    cards: Vec<C>,
+    /// Where each part's cards begin, and the end.
     starts: Vec<u32>,
 }
 
@@ -47,28 +67,41 @@ impl Parts {
         n_parts: usize,
         part_of: impl Fn(u32) -> usize + Sync,
     ) -> Self {
+        Self::deal_cards(n_items, n_parts, |item| item, part_of)
+    }
+}
+
+impl<C: Card> Parts<C> {
+    /// Deals the cards of items `0..n_items`; `part_of` must return less than `n_parts`.
+    pub(crate) fn deal_cards(
+        n_items: usize,
+        n_parts: usize,
+        card: impl Fn(u32) -> C + Sync,
+        part_of: impl Fn(C) -> usize + Sync,
+    ) -> Self {
         assert!(u32::try_from(n_items).is_ok(), "items are numbered in 32 bits");
         let chunks = (0..n_items.div_ceil(CHUNK))
             .into_par_iter()
             .map(|i| {
                 let range = i * CHUNK..n_items.min((i + 1) * CHUNK);
-                Chunk::deal(range.start as u32..range.end as u32, n_parts, &part_of)
+                let range = range.start as u32..range.end as u32;
+                Chunk::deal(range, n_parts, &card, &part_of)
             })
             .collect();
         Self { chunks, n_parts, n_items }
     }
 
-    /// Works every part: `work` gets the part's number and its items, ascending.
-    pub(crate) fn work<T: Send>(&self, work: impl Fn(usize, &[u32]) -> T + Sync) -> Vec<T> {
-        (0..self.n_parts).into_par_iter().map(|part| work(part, &self.items(part))).collect()
+    /// Works every part: `work` gets the part's number and its cards, items ascending.
+    pub(crate) fn work<T: Send>(&self, work: impl Fn(usize, Vec<C>) -> T + Sync) -> Vec<T> {
+        (0..self.n_parts).into_par_iter().map(|part| work(part, self.cards(part))).collect()
     }
 
-    fn items(&self, part: usize) -> Vec<u32> {
-        let mut items = Vec::new();
+    fn cards(&self, part: usize) -> Vec<C> {
+        let mut cards = Vec::new();
         for chunk in &self.chunks {
-            items.extend_from_slice(chunk.part(part));
+            cards.extend_from_slice(chunk.part(part));
         }
-        items
+        cards
     }
 
     /// Puts the answers of the parts, one an item in the part's order, into the items' order.
@@ -86,8 +119,8 @@ impl Parts {
             |(i, ((out, chunk), firsts))| {
                 for part in 0..self.n_parts {
                     let answers = &answers[part][firsts[part]..];
-                    for (&item, &answer) in chunk.part(part).iter().zip(answers) {
-                        out[item as usize - i * CHUNK] = answer;
+                    for (card, &answer) in chunk.part(part).iter().zip(answers) {
+                        out[card.item() as usize - i * CHUNK] = answer;
                     }
                 }
             },
@@ -96,13 +129,14 @@ impl Parts {
     }
 }
 
-impl Chunk {
+impl<C: Card> Chunk<C> {
     fn deal(
         range: std::ops::Range<u32>,
         n_parts: usize,
-        part_of: &(impl Fn(u32) -> usize + Sync),
+        card: &(impl Fn(u32) -> C + Sync),
+        part_of: &(impl Fn(C) -> usize + Sync),
     ) -> Self {
-        let parts: Vec<u16> = range.clone().map(|item| part_of(item) as u16).collect();
+        let parts: Vec<u16> = range.clone().map(|item| part_of(card(item)) as u16).collect();
         let mut starts = vec![0; n_parts + 1];
         for &part in &parts {
             starts[part as usize + 1] += 1;
@@ -111,17 +145,17 @@ impl Chunk {
             starts[part + 1] += starts[part];
         }
         let mut next = starts.clone();
-        let mut items = vec![0; parts.len()];
+        let mut cards = vec![C::default(); parts.len()];
         for (item, &part) in range.zip(&parts) {
             let slot = &mut next[part as usize];
-            items[*slot as usize] = item;
+            cards[*slot as usize] = card(item);
             *slot += 1;
         }
-        Self { items, starts }
+        Self { cards, starts }
     }
 
-    fn part(&self, part: usize) -> &[u32] {
-        &self.items[self.starts[part] as usize..self.starts[part + 1] as usize]
+    fn part(&self, part: usize) -> &[C] {
+        &self.cards[self.starts[part] as usize..self.starts[part + 1] as usize]
     }
 }
 

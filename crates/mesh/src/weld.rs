@@ -138,10 +138,14 @@ pub(crate) fn exactly(soup: &Soup) -> Mesh {
     let mut vertex_of = first_nearby(corners.len(), key);
     let own = |(i, first): (u32, &u32)| (i == *first).then_some(i);
     let left: Vec<u32> = (0..).zip(&vertex_of).filter_map(own).collect();
-    let key = |i: u32| key(left[i as usize]);
+    let card = |i: u32| {
+        let [x, y, z] = key(left[i as usize]).map(u128::from);
+        x << 96 | y << 64 | z << 32 | u128::from(i)
+    };
     let n_parts = parts_for(left.len());
-    let parts = Parts::deal(left.len(), n_parts, |i| part_of(key(i), n_parts));
-    let firsts = parts.work(|_, items| first_equal(items, key));
+    let part_of = |card: u128| part_of(key_of(card), n_parts);
+    let parts = Parts::deal_cards(left.len(), n_parts, card, part_of);
+    let firsts = parts.work(|_, cards| first_equal(cards));
     let firsts: Vec<&[u32]> = firsts.iter().map(Vec::as_slice).collect();
     let mut vertex_of_left = parts.gather(&firsts);
     let mut vertices = Vec::with_capacity(corners.len() / 5);
@@ -217,19 +221,22 @@ fn part_of(key: [u32; 3], n_parts: usize) -> usize {
     (((mix(key) >> 32) * n_parts as u64) >> 32) as usize
 }
 
-/// For each item, the first item with the same key.
-fn first_equal(items: &[u32], key: impl Fn(u32) -> [u32; 3]) -> Vec<u32> {
-    let pack = |(position, &item): (usize, &u32)| {
-        let [x, y, z] = key(item).map(u128::from);
-        x << 96 | y << 64 | z << 32 | position as u128
-    };
-    let mut entries: Vec<u128> = items.iter().enumerate().map(pack).collect();
+/// The key on a card of `x`, `y`, `z` and an item's number.
+fn key_of(card: u128) -> [u32; 3] {
+    [(card >> 96) as u32, (card >> 64) as u32, (card >> 32) as u32]
+}
+
+/// For each card, the first item with the same key.
+fn first_equal(cards: Vec<u128>) -> Vec<u32> {
+    let items: Vec<u32> = cards.iter().map(|&card| card as u32).collect();
+    // Items ascend with their position, which takes their place in the cards.
+    let mut entries = cards;
+    for (position, entry) in entries.iter_mut().enumerate() {
+        *entry = *entry >> 32 << 32 | position as u128;
+    }
     // The bits that chose the part are the high ones: these are fresh.
     let n_buckets = (items.len() / 4).next_power_of_two();
-    let bucket_of = |entry: u128| {
-        let key = [(entry >> 96) as u32, (entry >> 64) as u32, (entry >> 32) as u32];
-        (mix(key) >> 8) as usize & (n_buckets - 1)
-    };
+    let bucket_of = |entry: u128| (mix(key_of(entry)) >> 8) as usize & (n_buckets - 1);
     // A part far too large has few different keys: they are nearly in order, and need no copy.
     let sorted = if items.len() > LARGE_PART {
         entries.sort_unstable();

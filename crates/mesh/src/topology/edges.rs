@@ -39,7 +39,7 @@ impl Edges {
         let low = |half: u32| ends_of(&triangles[half as usize / 3], half as usize % 3)[0];
         let part_of = |half: u32| (u64::from(low(half)) * n_parts as u64 / n_vertices) as usize;
         let parts = Parts::deal(n_halves, n_parts, part_of);
-        let mut found = parts.work(|_, halves| find(triangles, halves));
+        let mut found = parts.work(|_, halves| find(triangles, &halves));
         let mut base = 0;
         for part in &mut found {
             part.shift(base);
