@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod arcs;
 mod batch;
 mod budgets;
 mod bundled;

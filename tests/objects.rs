@@ -201,3 +201,63 @@ fn a_program_in_part_coordinates_is_written_beside_any_other() {
     let twice = ["slice", "a.stl", "-o", "p.gcode", "--preview-gcode", "p.gcode"];
     scratch.run(&twice).refused("OutputTwice", 7);
 }
+
+#[test]
+fn models_may_have_walls_and_infill_of_their_own() {
+    let scratch = Scratch::new();
+    scratch.file("a.stl", mesh::stl::write(&mesh::shapes::block(16.0, 16.0, 6.0)));
+    let slice = |more: &[&str]| {
+        let mut all =
+            vec!["slice", "a.stl", "a.stl", "--at=-20,0", "--at=20,0", "-q", "-o", "p.gcode"];
+        all.extend(["--dialect", "klipper-polar", "--set", "fill_density=10%"]);
+        all.extend(more);
+        scratch.run(&all).expect(0);
+        let text = std::fs::read_to_string(scratch.path("p.gcode")).unwrap();
+        [1, 2].map(|k| {
+            let [begin, end] =
+                ["START", "END"].map(|word| format!("EXCLUDE_OBJECT_{word} NAME=a_{k}"));
+            (filament(&text, &begin, &end, None), filament(&text, &begin, &end, Some("Perimeter")))
+        })
+    };
+    let [(left, left_walls), (right, right_walls)] = slice(&[]);
+    assert!((left / right - 1.0).abs() < 0.02, "{left} {right}");
+    let own = ["--object", "2:fill_density=60%", "--object", "2:perimeters=4"];
+    let [(same, same_walls), (full, more_walls)] = slice(&own);
+    assert!((same / left - 1.0).abs() < 0.01 && (same_walls / left_walls - 1.0).abs() < 0.01);
+    assert!(full > 1.3 * right && more_walls > 2.5 * right_walls, "{full} {right}");
+    // All have one skirt, and the twin finds nothing.
+    let text = std::fs::read_to_string(scratch.path("p.gcode")).unwrap();
+    assert!(text.contains("\n; model 2: fill_density=60%\n"));
+    let skirts = |text: &str| text.matches(";TYPE:Skirt/Brim").count();
+    assert_eq!(skirts(&text), 1);
+    for curved in [&["--layers", "conical", "--cone-angle", "15"][..], &["--copies", "2"]] {
+        let mut all =
+            vec!["slice", "a.stl", "a.stl", "-q", "-o", "c.gcode", "--object", "1:perimeters=1"];
+        all.extend(curved);
+        scratch.run(&all).expect(0);
+    }
+    for wrong in ["2", "0:perimeters=3", "3:perimeters=3", "x:perimeters=3"] {
+        scratch.run(&["slice", "a.stl", "a.stl", "--object", wrong]).refused("Usage", 2);
+    }
+    let whole = ["slice", "a.stl", "--object", "1:layer_height_mm=0.1"];
+    scratch.run(&whole).refused("ConfigConflict", 6);
+    scratch.run(&["slice", "a.stl", "--object", "1:no=1"]).refused("ConfigUnknownKey", 6);
+}
+
+/// Filament laid between the begin and the end of an object, of one role or of all.
+fn filament(program: &str, begin: &str, end: &str, role: Option<&str>) -> f64 {
+    let (mut inside, mut is_role, mut fed) = (false, false, 0.0);
+    for line in program.lines() {
+        inside |= line == begin;
+        inside &= line != end;
+        if let Some(label) = line.strip_prefix(";TYPE:") {
+            is_role = role == Some(label);
+        }
+        let moves = line.starts_with("G1 X");
+        if inside && moves && (is_role || role.is_none()) {
+            let word = line.split(' ').find_map(|word| word.strip_prefix('E')?.parse::<f64>().ok());
+            fed += word.filter(|fed| *fed > 0.0).unwrap_or(0.0);
+        }
+    }
+    fed
+}

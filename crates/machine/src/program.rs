@@ -4,7 +4,7 @@
 //! lift `z` (mm). Every move also says where in the part the nozzle then stands, for dialects
 //! whose firmware turns part coordinates into joints itself.
 
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 
 /// The turn of the bed, accumulated over the whole program and never wrapped, radians.
 ///
@@ -191,11 +191,24 @@ impl Role {
     }
 }
 
+/// A move along a circle of the part, level, at constant speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Arc {
+    /// Where it ends and what it feeds; its path is that along the circle.
+    pub motion: Move,
+    /// The middle of the circle, part frame, mm.
+    pub centre: Point2<f64>,
+    /// Whether it runs clockwise, seen from above.
+    pub clockwise: bool,
+}
+
 /// One step of a program.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
     /// A move of the axes or the filament.
     Move(Move),
+    /// A move along a circle, for firmwares that take part coordinates and draw circles.
+    Arc(Arc),
     /// A new layer begins.
     Layer(Layer),
     /// What the following moves lay, and the width of the bead, mm.

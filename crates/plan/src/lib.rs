@@ -10,6 +10,7 @@
 //! layer by layer.
 
 pub mod acceleration;
+pub mod arcs;
 pub mod axis;
 mod comb;
 pub mod cooling;

@@ -2,11 +2,12 @@
 
 use machine::kinematics::Unreachable;
 use machine::profile::Printer;
-use machine::program::{Joints, Move, Role, Step};
+use machine::program::{Arc, Joints, Move, Role, Step};
 use nalgebra::{Point2, Point3, Vector3};
 use slicer::toolpath::LayerPaths;
 
 use crate::acceleration::Accelerations;
+use crate::arcs::with_arcs;
 use crate::cooling::{CoolingParams, slow_down};
 use crate::helix::Helix;
 use crate::objects::Objects;
@@ -156,7 +157,10 @@ pub const TOLD_EVERY_S: f64 = 15.0;
 /// Puts the time that has passed between the steps of a layer, at its begin and every so often; what the
 /// moves were planned to take is stretched to the layer's estimate.
 fn timed(steps: Vec<Step>, from: f64, to: f64) -> Vec<Step> {
-    let planned = |step: &Step| if let Step::Move(motion) = step { motion.duration } else { 0.0 };
+    let planned = |step: &Step| match step {
+        Step::Move(motion) | Step::Arc(Arc { motion, .. }) => motion.duration,
+        _ => 0.0,
+    };
     let all: f64 = steps.iter().map(planned).sum();
     let scale = if all > 0.0 { (to - from) / all } else { 0.0 };
     let (mut now, mut told) = (from, f64::NEG_INFINITY);
@@ -191,6 +195,7 @@ pub struct Planner<'a> {
     fan: f64,
     objects: Option<Objects>,
     tells_time: bool,
+    draws_arcs: bool,
     is_first_layer: bool,
     /// The acceleration that was told last, mm/s².
     acceleration: f64,
@@ -220,6 +225,7 @@ impl<'a> Planner<'a> {
             fan: 0.0,
             objects: None,
             tells_time: false,
+            draws_arcs: false,
             is_first_layer: true,
             acceleration: f64::NAN,
         }
@@ -229,6 +235,12 @@ impl<'a> Planner<'a> {
     #[must_use]
     pub fn with_objects(self, objects: Objects) -> Self {
         Self { objects: Some(objects), ..self }
+    }
+
+    /// Puts arcs in place of lines on a circle.
+    #[must_use]
+    pub fn drawing_arcs(self) -> Self {
+        Self { draws_arcs: true, ..self }
     }
 
     /// Tells how long the print has taken so far, every [`TOLD_EVERY_S`] or so.
@@ -270,9 +282,14 @@ impl<'a> Planner<'a> {
         }
         let items = self.router.layer(layer, &lines, &self.params.speeds, &self.params.filament);
         let items = self.with_bridge_fan(items, layer.index);
-        let before = self.totals.time;
+        let (before, start) = (self.totals.time, self.resampler.at_part());
         let planned =
             self.lower(items).map_err(|source| PlanError { layer: layer.index, source })?;
+        let planned = if self.draws_arcs {
+            with_arcs(planned, start, self.params.resample.chord)
+        } else {
+            planned
+        };
         let fan = self.params.heat.fan_of(layer.index, self.totals.time - before);
         let mut steps = self.heat(layer.index, fan);
         if climbs {

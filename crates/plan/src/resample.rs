@@ -200,6 +200,12 @@ impl Resampler {
         self.joints
     }
 
+    /// Returns where the nozzle stands in the part, as the text says it.
+    #[must_use]
+    pub(crate) fn at_part(&self) -> Point3<f64> {
+        self.at_part
+    }
+
     /// Returns where the nozzle stands, in the slicer's frame.
     #[must_use]
     pub fn at(&self) -> Point3<f64> {

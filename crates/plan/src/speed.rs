@@ -377,9 +377,10 @@ fn come_to_rest(durations: &mut [f64], moves: &[[f64; AXES]], law: &Law<'_>) -> 
 /// Makes moves `i` and `i + 1` agree; returns whether anything changed.
 fn agree(i: usize, durations: &mut [f64], moves: &[[f64; AXES]], law: &Law<'_>) -> bool {
     let mut changed = false;
-    for k in 0..AXES {
+    let (here, next) = (moves[i], moves[i + 1]);
+    for (k, (&here, next)) in here.iter().zip(next).enumerate() {
         let acceleration = law.between(k, i);
-        let distances = [moves[i][k], moves[i + 1][k]];
+        let distances = [here, next];
         let between = f64::midpoint(durations[i], durations[i + 1]);
         // Both sides of `change of speed <= acceleration * time`, times both durations.
         let change = (distances[1] * durations[i] - distances[0] * durations[i + 1]).abs();

@@ -303,6 +303,10 @@ pub struct Slice {
     /// How far the footprints of several models stay apart, mm
     #[arg(long, value_name = "MM", default_value_t = 6.0)]
     pub gap: f64,
+    /// Set one value for a model alone, by its place in the command line, counted from 1: walls, skins,
+    /// infill, moved outlines (repeatable)
+    #[arg(long, value_name = "N:KEY=VALUE", action = ArgAction::Append)]
+    pub object: Vec<String>,
     /// How often to print every model
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=100))]
     pub copies: u16,
@@ -327,6 +331,10 @@ pub struct Slice {
     /// Write the program in part coordinates, too, for viewers
     #[arg(long, value_name = "FILE.gcode")]
     pub preview_gcode: Option<PathBuf>,
+    /// Write runs of short lines on a circle as arcs (G2, G3), in dialects whose firmwares draw them in
+    /// part coordinates: cartesian. Circles about the axis are one move of a polar dialect anyway
+    #[arg(long)]
+    pub arcs: bool,
     /// How much work it may be
     #[command(flatten)]
     pub effort: Effort,

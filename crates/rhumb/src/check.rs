@@ -40,9 +40,7 @@ pub fn check(
         thorough,
     });
     each_line(program, |text| {
-        if let Some(segment) = verifier.line_bytes(text) {
-            each(&segment);
-        }
+        verifier.each_of_line(text, &mut each);
     })?;
     Ok(verifier.finish())
 }

@@ -19,6 +19,7 @@ use mesh::topology::Solid;
 use nalgebra::{Point2, Rotation3, Vector2, Vector3};
 
 use crate::failure::Failure;
+use crate::groups::Own;
 use crate::objects::{Object, hull, outline, overlap};
 use crate::place::{Placed, Pose, Wish, place, whole_places};
 
@@ -42,11 +43,13 @@ pub struct Arrangement {
     pub gap: f64,
     /// How often every model is printed.
     pub copies: usize,
+    /// Models that are filled other than the rest.
+    pub own: Vec<Own>,
 }
 
 impl Default for Arrangement {
     fn default() -> Self {
-        Self { at: Vec::new(), gap: 6.0, copies: 1 }
+        Self { at: Vec::new(), gap: 6.0, copies: 1, own: Vec::new() }
     }
 }
 
@@ -116,73 +119,56 @@ pub fn arrange(
 ) -> Result<(Placed, Option<[usize; 2]>), Failure> {
     let mut parts = Vec::new();
     let aside = solids.first().map_or(Point2::origin(), |(_, _, wish)| wish.centre);
-    let (mut names, mut rests) = (Vec::new(), Vec::new());
-    for (name, solid, wish) in solids {
+    for (model, (name, solid, wish)) in solids.into_iter().enumerate() {
         let part = place(solid, &Wish { centre: Point2::origin(), ..wish }, orient)?;
-        names.extend(std::iter::repeat_n(name, arrangement.copies));
-        rests.extend(std::iter::repeat_n(part.rest, arrangement.copies));
-        parts.extend(std::iter::repeat_n((part.solid, part.reach), arrangement.copies));
+        parts.extend(std::iter::repeat_n((model, name, part), arrangement.copies));
     }
     let centres = if arrangement.at.is_empty() {
-        let radii: Vec<f64> = parts.iter().map(|(_, reach)| *reach).collect();
+        let radii: Vec<f64> = parts.iter().map(|(_, _, part)| part.reach).collect();
         packed(&radii, arrangement.gap)
     } else {
         arrangement.at.clone()
     };
     let mut all = Mesh::default();
-    let mut parts_of = Vec::with_capacity(parts.len());
-    for ((part, _), centre) in parts.into_iter().zip(centres) {
-        let first = all.vertices.len() as u32;
+    let (mut objects, mut rests) = (Vec::new(), Vec::new());
+    for ((model, name, part), centre) in parts.into_iter().zip(centres) {
+        let (first, first_facet) = (all.vertices.len(), all.triangles.len());
         let aside = Vector3::new(centre.x + aside.x, centre.y + aside.y, 0.0);
-        let mesh = part.into_mesh();
+        let mesh = part.solid.into_mesh();
         all.vertices.extend(mesh.vertices.iter().map(|p| p + aside));
-        parts_of.push((first as usize..all.vertices.len(), all.triangles.len()));
-        all.triangles.extend(mesh.triangles.iter().map(|corners| corners.map(|v| v + first)));
+        let moved = mesh.triangles.iter().map(|corners| corners.map(|v| v + first as u32));
+        all.triangles.extend(moved);
+        let vertices = first..all.vertices.len();
+        let triangles = first_facet..all.triangles.len();
+        let outline = Region::default();
+        objects.push(Object { name, model, vertices, triangles, outline });
+        rests.push(part.rest);
     }
     let azimuth = whole_places(reference_azimuth(&all));
     let reach = all.vertices.iter().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
     let placement = Placement { rotation: Rotation3::identity(), shift: Vector3::zeros() };
-    let (outlines, overlap) = outlines(&all, &parts_of);
-    let objects = names.into_iter().zip(outlines);
-    let objects = objects.map(|(name, outline)| Object { name, outline }).collect();
+    let overlap = find_outlines(&all, &mut objects);
     let solid = Solid::new(all);
     Ok((Placed { solid, placement, rest: None, azimuth, reach, objects, rests }, overlap))
 }
 
-/// The outlines of parts, seen from above, each given by its vertices and its first triangle, and two of
-/// them, counted from 1, that overlap. A part whose box no other reaches into has the hull of its outline.
-fn outlines(
-    all: &Mesh,
-    parts: &[(std::ops::Range<usize>, usize)],
-) -> (Vec<Region>, Option<[usize; 2]>) {
+/// Finds the outlines of objects, seen from above, and two of them, counted from 1, that overlap. An
+/// object whose box no other reaches into has the hull of its outline.
+fn find_outlines(all: &Mesh, objects: &mut [Object]) -> Option<[usize; 2]> {
     let boxes: Vec<Bounds> =
-        parts.iter().map(|(vertices, _)| Bounds::of(&all.vertices[vertices.clone()])).collect();
+        objects.iter().map(|o| Bounds::of(&all.vertices[o.vertices.clone()])).collect();
     let meets = |a: &Bounds, b: &Bounds| {
         (0..2).all(|k| a.min[k] < b.max[k] - TOUCHING_MM && b.min[k] < a.max[k] - TOUCHING_MM)
     };
-    let ends = parts.iter().skip(1).map(|(_, first)| *first).chain([all.triangles.len()]);
-    let outlines: Vec<Region> = parts
-        .iter()
-        .zip(ends)
-        .enumerate()
-        .map(|(i, ((vertices, first), end))| {
-            let offset = vertices.start as u32;
-            let part = Mesh {
-                vertices: all.vertices[vertices.clone()].to_vec(),
-                triangles: all.triangles[*first..end]
-                    .iter()
-                    .map(|corners| corners.map(|v| v - offset))
-                    .collect(),
-            };
-            let others = boxes.iter().enumerate().filter(|(j, _)| *j != i);
-            let is_alone = others.into_iter().all(|(_, other)| !meets(&boxes[i], other));
-            if is_alone { hull(&part) } else { outline(&part) }
-        })
-        .collect();
-    let pairs = (0..parts.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
+    for (i, object) in objects.iter_mut().enumerate() {
+        let part = object.mesh(all);
+        let is_alone = (0..boxes.len()).all(|j| j == i || !meets(&boxes[i], &boxes[j]));
+        object.outline = if is_alone { hull(&part) } else { outline(&part) };
+    }
+    let pairs = (0..objects.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
     let mut near = pairs.filter(|(i, j)| meets(&boxes[*i], &boxes[*j]));
-    let found = near.find(|(i, j)| overlap(&outlines[*i], &outlines[*j]));
-    (outlines, found.map(|(i, j)| [i + 1, j + 1]))
+    let found = near.find(|(i, j)| overlap(&objects[*i].outline, &objects[*j].outline));
+    found.map(|(i, j)| [i + 1, j + 1])
 }
 
 /// The pose of models for which the user wants none: flat, but objects that have places with regard

@@ -1,22 +1,41 @@
 //! Several models on one bed, seen from above.
 
+use std::ops::Range;
+
 use geom::circle::convex_hull;
 use geom::grid::mm;
 use geom::region::{Fill, Region};
 use mesh::mesh::Mesh;
-use nalgebra::{Point2, Rotation2};
+use nalgebra::Point2;
 
 /// One of several models, where it stands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
     /// What it is called.
     pub name: String,
+    /// Which model of the command line it is, counted from 0; copies are the same.
+    pub model: usize,
+    /// Its vertices in the mesh of all.
+    pub vertices: Range<usize>,
+    /// Its facets there.
+    pub triangles: Range<usize>,
     /// Its outline from above, part frame, or, where no other model reaches into the box around it,
     /// the hull of it.
     pub outline: Region,
 }
 
 impl Object {
+    /// Returns its part of the mesh of all.
+    #[must_use]
+    pub fn mesh(&self, all: &Mesh) -> Mesh {
+        let first = self.vertices.start as u32;
+        let facets = all.triangles[self.triangles.clone()].iter();
+        Mesh {
+            vertices: all.vertices[self.vertices.clone()].to_vec(),
+            triangles: facets.map(|corners| corners.map(|v| v - first)).collect(),
+        }
+    }
+
     /// Returns the corners of its hull.
     #[must_use]
     pub fn hull(&self) -> Vec<Point2<f64>> {
@@ -51,11 +70,4 @@ const TOUCHING_MM2: f64 = 1e-3;
 #[must_use]
 pub fn overlap(a: &Region, b: &Region) -> bool {
     a.intersection(b).area() > TOUCHING_MM2
-}
-
-/// Returns corners turned about the axis.
-#[must_use]
-pub fn turned(corners: &[Point2<f64>], angle: f64) -> Vec<Point2<f64>> {
-    let turn = Rotation2::new(angle);
-    corners.iter().map(|corner| turn * corner).collect()
 }

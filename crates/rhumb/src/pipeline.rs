@@ -27,6 +27,7 @@ use twin::picture::thumbnail::Thumbnail;
 
 use crate::choice::{Choice, choose};
 use crate::failure::Failure;
+use crate::groups::{Group, Own, groups, stacks, surround, together};
 use crate::interrupt::Interrupt;
 use crate::levels::{Layout, check_cuts};
 use crate::models::{self, Arrangement, Model};
@@ -156,12 +157,14 @@ pub fn slice_all(
     let mut text = Emitter::for_printer(out, job.dialect, &job.printer);
     // On a bed that turns no side is the front: the picture is that of the upright part, too.
     let thumbnail = Thumbnail::draw(&upright);
-    let start = start_with_objects(&placed, &job, &mut text);
+    let start = start_with_objects(&placed, &arrangement.own, &job, &mut text);
     program_text::head(&mut text, request.name, request.made_at, &thumbnail, &start)
         .map_err(written)?;
     let outlines = placed.objects.iter().map(|object| object.outline.clone()).collect();
     let objects = Objects { outlines };
-    let mut printed = layers(&upright, &stages, &objects, &job, &mut text, watch)?;
+    let groups = groups(&placed, &turned, &arrangement.own, &job);
+    let parts = Parts { all: &upright, groups: &groups, objects: &objects };
+    let mut printed = layers(&parts, &stages, &job, &mut text, watch)?;
     for (_, island) in &mut printed.floating {
         island.at = turned.inverse() * island.at;
     }
@@ -226,16 +229,22 @@ fn time_of(
     job.plan.resample.azimuth = placed.azimuth;
     let mut nobody = std::io::sink();
     let mut text = Emitter::for_printer(&mut nobody as &mut dyn Write, job.dialect, &job.printer);
-    Ok(layers(upright, &stages, &Objects::default(), &job, &mut text, watch)?.totals.time)
+    let parts = Parts { all: upright, groups: &[], objects: &Objects::default() };
+    Ok(layers(&parts, &stages, &job, &mut text, watch)?.totals.time)
 }
 
 /// The start program, and after it which objects there are, where there are several and they are told.
 fn start_with_objects(
     placed: &Placed,
+    own: &[Own],
     job: &Job,
     text: &mut Emitter<&mut dyn Write>,
 ) -> Vec<String> {
     let mut start = job.start.clone();
+    for own in own {
+        let model = own.model + 1;
+        start.extend(own.said.iter().map(|said| format!("; model {model}: {said}")));
+    }
     if let Some(words) = job.labels.filter(|_| placed.objects.len() > 1) {
         let labels = Labels::new(words, placed.objects.iter().map(|object| object.name.as_str()));
         let hulls: Vec<_> = placed.objects.iter().map(Object::hull).collect();
@@ -305,10 +314,17 @@ struct Printed {
     heights: Vec<f64>,
 }
 
+/// What is sliced, in the frame that turns with the part.
+struct Parts<'a> {
+    all: &'a Solid,
+    /// By how they are filled, where models differ in that.
+    groups: &'a [Group],
+    objects: &'a Objects,
+}
+
 fn layers(
-    solid: &Solid,
+    parts: &Parts<'_>,
     stages: &[Stage],
-    objects: &Objects,
     job: &Job,
     text: &mut Emitter<&mut dyn Write>,
     watch: &mut Watch<'_>,
@@ -318,8 +334,11 @@ fn layers(
     if job.tells_progress {
         planner = planner.telling_time();
     }
-    if objects.outlines.len() > 1 && job.labels.is_some() {
-        planner = planner.with_objects(objects.clone());
+    if job.draws_arcs {
+        planner = planner.drawing_arcs();
+    }
+    if parts.objects.outlines.len() > 1 && job.labels.is_some() {
+        planner = planner.with_objects(parts.objects.clone());
     }
     let count: usize = stages.iter().map(|stage| stage.printed.len()).sum();
     watch.progress.stage("slice", count as u64);
@@ -328,12 +347,24 @@ fn layers(
         if stages.len() > 1 && stage.morph.is_none() {
             write(text, &[surface_remark(stage, stage.printed.start)])?;
         }
-        let mut stack = Stack::new(solid, stage, below, job);
+        let mut stacks = stacks(parts.groups, parts.all, stage, below, job);
         for start in stage.printed.clone().step_by(WINDOW) {
             watch.interrupt.check()?;
             let window = start..(start + WINDOW).min(stage.printed.end);
-            stack.reach(&window, |tears| printed.count_tears(tears));
-            let filled = stack.fill(window.clone());
+            for stack in &mut stacks {
+                stack.reach(&window, |tears| printed.count_tears(tears));
+            }
+            let each = stacks.iter().map(|stack| stack.fill(window.clone())).collect();
+            let mut filled = together(each);
+            if !parts.groups.is_empty() && printed.levels.is_empty() {
+                // Skirt and brim go round all.
+                let mut all = Stack::new(parts.all, stage, below, job);
+                let first = start..start + 1;
+                all.reach(&first, |_| {});
+                if let (Some(layer), Some(all)) = (filled.first_mut(), all.fill(first).pop()) {
+                    surround(layer, all);
+                }
+            }
             for (k, mut filled) in window.zip(filled) {
                 watch.progress.advance(1);
                 // Layers of one stage may pass beside the part, above or below it.
@@ -405,7 +436,10 @@ fn load(
     let health = models::together(healths, arrangement.copies);
     let repair_ms = clock.lap();
     watch.progress.stage("orient", 1);
-    let is_one = solids.len() == 1 && arrangement.copies == 1 && arrangement.at.is_empty();
+    let is_one = solids.len() == 1
+        && arrangement.copies == 1
+        && arrangement.at.is_empty()
+        && arrangement.own.is_empty();
     let (given, (placed, overlap)) = if is_one && let Some((_, solid, wish)) = solids.pop() {
         (solid.mesh().bounds(), (place(solid, &wish, &job.orient)?, None))
     } else {

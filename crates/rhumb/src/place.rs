@@ -118,6 +118,7 @@ fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
 }
 
 /// A model on the bed.
+#[derive(Clone)]
 pub struct Placed {
     /// The part, in the part frame.
     pub solid: Solid,

@@ -202,7 +202,7 @@ impl LostArea {
     }
 
     /// Adds what another part of the layer lost.
-    pub(crate) fn merge(&mut self, other: &Self) {
+    pub fn merge(&mut self, other: &Self) {
         self.area += other.area;
         if other.worst_area > self.worst_area {
             (self.worst, self.worst_area) = (other.worst, other.worst_area);

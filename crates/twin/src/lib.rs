@@ -17,6 +17,7 @@
 //! Lengths are mm, angles radians, times seconds, temperatures degrees Celsius. Frames: *Part*
 //! turns with the bed, *Machine* does not; both as in [`machine::kinematics`].
 
+mod arc;
 pub mod check;
 pub mod columns;
 pub mod curve;

@@ -177,6 +177,26 @@ impl Replay {
         self.command(command)
     }
 
+    /// Follows a line from here to a place, one of several that a command is drawn with, with its share of
+    /// the filament.
+    pub(crate) fn piece(&mut self, to: [f64; 2], z: f64, filament: f64) -> Segment {
+        let from = self.stand;
+        self.stand = self.stand_at(to, z);
+        self.segment(&from, filament)
+    }
+
+    /// Takes the speed of a command.
+    pub(crate) fn take_speed(&mut self, command: &Command<'_>) {
+        if let Some(word) = command.word(b'F').filter(|word| *word > 0.0) {
+            self.speed_word = word;
+        }
+    }
+
+    /// Where the words of the plane and `Z` are.
+    pub(crate) fn words(&self) -> ([f64; 2], f64) {
+        (self.stand.plane, self.stand.z)
+    }
+
     /// Counts a line that could not be read.
     pub(crate) fn skip(&mut self) {
         self.line += 1;
@@ -238,9 +258,7 @@ impl Replay {
     }
 
     fn motion(&mut self, command: &Command<'_>) -> Option<Segment> {
-        if let Some(word) = command.word(b'F').filter(|word| *word > 0.0) {
-            self.speed_word = word;
-        }
+        self.take_speed(command);
         let words = self.dialect.plane.map(|word| command.word(word.letter));
         let (z, filament) = (command.word(b'Z'), command.word(b'E'));
         let from = self.stand;

@@ -25,7 +25,9 @@ use machine::gcode::dialect::{Dialect, Space};
 use machine::gcode::{Command, MOST_COLUMNS};
 use machine::profile::Printer;
 use mesh::mesh::Mesh;
+use nalgebra::Point2;
 
+use crate::arc::{Chords, ROUND, chords};
 use crate::check::acceleration::Acceleration;
 use crate::check::axis::Clearance;
 use crate::check::continuity::Continuity;
@@ -37,10 +39,10 @@ use crate::check::modes::Modes;
 use crate::check::reach::Reach;
 use crate::check::speed::Speed;
 use crate::check::surface::{ROUND_AXIS, Surface};
-use crate::check::text::Text;
+use crate::check::text::{self, Text, is_arc};
 use crate::check::volume::{Enclosed, Volume};
 use crate::family::Family;
-use crate::finding::{Finding, Findings, Omitted, Place, Severity};
+use crate::finding::{Finding, Findings, Omitted, Place, Severity, exceeds};
 use crate::ramps::Ramps;
 use crate::replay::{Event, Heating, LayerMark, Replay, read};
 use crate::rounding::Doubt;
@@ -105,6 +107,8 @@ pub const CONVERTED_FROM: &str = "converted from ";
 #[derive(Debug)]
 pub struct Verifier<'a> {
     replay: Replay,
+    /// The motions of the last line but its last.
+    pieces: Vec<Segment>,
     findings: Findings,
     tally: Tally,
     ramps: Ramps,
@@ -151,6 +155,7 @@ impl<'a> Verifier<'a> {
         let meant = filament_area / setup.multiplier;
         Self {
             replay: Replay::new(printer, dialect),
+            pieces: Vec::new(),
             findings: Findings::default(),
             tally: Tally::default(),
             ramps: Ramps::new(printer),
@@ -178,8 +183,21 @@ impl<'a> Verifier<'a> {
         self.line_bytes(text.as_bytes())
     }
 
-    /// Judges the next line, whatever bytes it is made of.
+    /// Judges the next line, whatever bytes it is made of; `each` sees its motions, of which an arc has
+    /// many.
+    pub fn each_of_line(&mut self, text: &[u8], mut each: impl FnMut(&Segment)) {
+        let last = self.line_bytes(text);
+        for piece in std::mem::take(&mut self.pieces) {
+            each(&piece);
+        }
+        if let Some(segment) = last {
+            each(&segment);
+        }
+    }
+
+    /// Judges the next line, whatever bytes it is made of, and returns its last motion.
     pub fn line_bytes(&mut self, text: &[u8]) -> Option<Segment> {
+        self.pieces.clear();
         let place = self.next_place();
         let mut command = Command::BLANK;
         // There is nothing to say of the characters of a plain line.
@@ -268,8 +286,37 @@ impl<'a> Verifier<'a> {
         }
         self.text.command(command, place, &mut self.findings);
         self.modes.command(command, place, &mut self.findings);
+        if is_arc(command, &self.setup.dialect) {
+            return self.arc(command, place);
+        }
         let event = self.replay.follow_command(command);
         self.event(event, place)
+    }
+
+    /// Follows an arc line by line.
+    fn arc(&mut self, command: &Command<'_>, place: Place) -> Option<Segment> {
+        let ([x, y], z) = self.replay.words();
+        let Some(Chords { ends, off }) = chords(command, &Point2::new(x, y)) else {
+            let event = self.replay.follow_command(command);
+            return self.event(event, place);
+        };
+        if exceeds(off, ROUND) {
+            self.findings.error(text::NAME, place, (off, ROUND), || {
+                format!("an arc ends {off:.4} mm off its circle, at most {ROUND} mm")
+            });
+        }
+        self.replay.skip();
+        self.replay.take_speed(command);
+        let rise = command.word(b'Z').unwrap_or(z) - z;
+        let share = 1.0 / ends.len() as f64;
+        let filament = command.word(b'E').unwrap_or(0.0) * share;
+        for (k, end) in (1..).zip(&ends) {
+            let z = z + rise * share * f64::from(k);
+            let segment = self.replay.piece([end.x, end.y], z, filament);
+            self.segment(&segment);
+            self.pieces.push(segment);
+        }
+        self.pieces.pop()
     }
 
     fn event(&mut self, event: Event, place: Place) -> Option<Segment> {

@@ -1,7 +1,7 @@
 //! The only place that writes programs as text.
 //!
 //! Promises, whatever comes in: one command a line, at most [`MOST_COLUMNS`] characters, printable
-//! ASCII, shortest decimal numbers, every motion a `G1`, the plane's two words always together,
+//! ASCII, shortest decimal numbers, every motion a `G1` (or `G2` and `G3`, where steps are arcs), the plane's two words always together,
 //! `F` positive. Filament is relative (`M83`); what rounding takes from one move is given to the
 //! next, so that the sum is right to half a last place.
 
@@ -13,7 +13,7 @@ use super::label::Labels;
 use super::number::{decimal, push_quantum, quantum, value};
 use super::speed_word::Way;
 use crate::profile::Printer;
-use crate::program::{BedTurn, Joints, Layer, Move, Role, Step};
+use crate::program::{Arc, BedTurn, Joints, Layer, Move, Role, Step};
 
 /// Longest line, in characters. Marlin's command buffer holds 96.
 pub const MOST_COLUMNS: usize = 90;
@@ -96,6 +96,7 @@ impl<W: Write> Emitter<W> {
     pub fn step(&mut self, step: &Step) -> io::Result<()> {
         match step {
             Step::Move(motion) => self.planned(motion),
+            Step::Arc(arc) => self.motion(&arc.motion, Some(arc)),
             Step::Layer(layer) => self.layer(layer),
             Step::Bead(role, width) => self.bead(*role, *width),
             Step::Fan(share) => self.fan(*share),
@@ -158,12 +159,12 @@ impl<W: Write> Emitter<W> {
     }
 
     fn planned(&mut self, motion: &Move) -> io::Result<()> {
-        let Some(correction) = &mut self.correction else { return self.motion(motion) };
+        let Some(correction) = &mut self.correction else { return self.motion(motion, None) };
         let (take_up, told) = correction.moves(motion);
         if let Some(take_up) = take_up {
-            self.motion(&take_up)?;
+            self.motion(&take_up, None)?;
         }
-        self.motion(&told)
+        self.motion(&told, None)
     }
 
     /// A line of the printer's owner, who knows nothing of inverse time.
@@ -180,7 +181,7 @@ impl<W: Write> Emitter<W> {
         self.text(line)
     }
 
-    fn motion(&mut self, motion: &Move) -> io::Result<()> {
+    fn motion(&mut self, motion: &Move, arc: Option<&Arc>) -> io::Result<()> {
         let decimals = self.dialect.decimals(motion);
         let plane = self.plane_words(&motion.to, motion);
         let counts = [quantum(plane[0], decimals[0]), quantum(plane[1], decimals[1])];
@@ -201,7 +202,12 @@ impl<W: Write> Emitter<W> {
             self.inverse_time = true;
             self.text("G93")?;
         }
-        self.line.extend_from_slice(b"G1");
+        let arc = arc.filter(|_| plane_moved).and_then(|arc| Some((arc, self.last_point()?)));
+        self.line.extend_from_slice(match arc {
+            None => b"G1",
+            Some((arc, _)) if arc.clockwise => b"G2",
+            Some(_) => b"G3",
+        });
         if plane_moved {
             for k in 0..2 {
                 self.line.extend_from_slice(&[b' ', self.dialect.plane[k].letter]);
@@ -211,6 +217,13 @@ impl<W: Write> Emitter<W> {
         if z_moved {
             self.line.extend_from_slice(b" Z");
             push_quantum(&mut self.line, z, MM_DECIMALS);
+        }
+        if let Some((arc, from)) = arc {
+            for (k, letter) in [b'I', b'J'].into_iter().enumerate() {
+                self.line.extend_from_slice(&[b' ', letter]);
+                let aside = quantum(arc.centre[k] - from[k], MM_DECIMALS);
+                push_quantum(&mut self.line, aside, MM_DECIMALS);
+            }
         }
         if filament != 0 {
             self.line.extend_from_slice(b" E");
@@ -230,6 +243,12 @@ impl<W: Write> Emitter<W> {
             self.position = Some([i64::MIN, i64::MIN, z]);
         }
         self.end_line()
+    }
+
+    /// Where the words of the plane are, as they were written last.
+    fn last_point(&self) -> Option<[f64; 2]> {
+        let last = self.position.filter(|last| last[0] != i64::MIN)?;
+        Some([0, 1].map(|k| value(last[k], NEAR_AXIS_DECIMALS)))
     }
 
     fn plane_words(&self, to: &Joints, motion: &Move) -> [f64; 2] {

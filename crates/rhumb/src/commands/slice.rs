@@ -1,11 +1,13 @@
 //! `rhumb slice`: the main job.
 
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-use machine::gcode::dialect::CARTESIAN;
+use machine::gcode::dialect::{CARTESIAN, Space};
 use machine::gcode::{Dialect, ELAPSED};
 use mesh::model::Format;
+use slicer::layer::PathParams;
 use slicer::level::Snap;
 use twin::verify::Verdict;
 
@@ -15,6 +17,7 @@ use crate::calibration;
 use crate::check::{check, refusal};
 use crate::clock;
 use crate::failure::Failure;
+use crate::groups::Own;
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::models::{Arrangement, Model};
@@ -23,7 +26,7 @@ use crate::pipeline::{self, Outcome, Request, Watch};
 use crate::place::parse_place;
 use crate::progress::{Bars, Progress, Silent};
 use crate::report::Report;
-use crate::settings::Job;
+use crate::settings::{Job, Settings};
 use crate::stopwatch::Stopwatch;
 use crate::summary;
 
@@ -37,8 +40,10 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     wanted.set.extend(arguments.layers.set());
     let (settings, mut job) = settings(&wanted)?;
     job.most_cuts = arguments.effort.most_cuts * 1e6;
+    job.draws_arcs = draws_arcs(arguments, &job)?;
     let wish = wish(&arguments.place)?;
-    let arrangement = arrangement(arguments)?;
+    let mut arrangement = arrangement(arguments)?;
+    arrangement.own = own_settings(arguments, &settings)?;
     let target = target(arguments);
     let inputs: Vec<&Path> = arguments.models.iter().map(PathBuf::as_path).collect();
     let bytes = inputs.iter().map(|path| input::read(path)).collect::<Result<Vec<_>, _>>()?;
@@ -48,11 +53,7 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     let placed_file = beside(&arguments.export_placed).transpose()?;
     let preview_file = beside(&arguments.preview_gcode).transpose()?;
 
-    let mut progress: Box<dyn Progress> = if manner.quiet || !std::io::stderr().is_terminal() {
-        Box::new(Silent)
-    } else {
-        Box::new(Bars::default())
-    };
+    let mut progress = progress(manner);
     let models: Vec<Model> = inputs
         .iter()
         .zip(&bytes)
@@ -87,12 +88,7 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
         None
     } else {
         progress.stage("verify", 1);
-        let mut lap = Stopwatch::start();
-        let text = BufReader::new(out.reread()?);
-        let full = arguments.effort.verify == Proof::Full;
-        let verdict = check(text, &job, Some(pipeline::part(&outcome)), full, |_| {})?;
-        outcome.timings.verify = lap.lap();
-        Some(verdict)
+        Some(proved(&out, &mut outcome, &job, arguments.effort.verify)?)
     };
     drop(progress);
     interrupt.check()?;
@@ -173,12 +169,36 @@ fn preview(
     wanted.dialect = Some(CARTESIAN.name.to_owned());
     let (settings, mut job) = settings(&wanted)?;
     job.most_cuts = seen.request.job.most_cuts;
+    job.draws_arcs = seen.request.job.draws_arcs;
     let request = Request { settings: &settings, job: &job, ..*seen.request };
     let mut text = BufWriter::with_capacity(1 << 16, file.file());
     pipeline::slice_all(&request, seen.models, seen.arrangement, &mut text, watch)?;
     text.flush().map_err(|error| output::failed(Path::new("preview"), &error))?;
     drop(text);
     Ok(file)
+}
+
+fn progress(manner: &Manner) -> Box<dyn Progress> {
+    if manner.quiet || !std::io::stderr().is_terminal() {
+        Box::new(Silent)
+    } else {
+        Box::new(Bars::default())
+    }
+}
+
+/// Reads the program again and judges it.
+fn proved(
+    out: &Output,
+    outcome: &mut Outcome,
+    job: &Job,
+    proof: Proof,
+) -> Result<Verdict, Failure> {
+    let mut lap = Stopwatch::start();
+    let text = BufReader::new(out.reread()?);
+    let full = proof == Proof::Full;
+    let verdict = check(text, job, Some(pipeline::part(outcome)), full, |_| {})?;
+    outcome.timings.verify = lap.lap();
+    Ok(verdict)
 }
 
 /// Where the program goes: `MODEL.gcode` in the working folder unless the user says.
@@ -227,7 +247,62 @@ fn arrangement(arguments: &Slice) -> Result<Arrangement, Failure> {
     if n_inputs > 1 {
         return Err(Failure::new("Usage", "standard input holds one model".to_owned()));
     }
-    Ok(Arrangement { at, gap, copies })
+    Ok(Arrangement { at, gap, copies, own: Vec::new() })
+}
+
+/// Whether runs of lines become arcs.
+fn draws_arcs(arguments: &Slice, job: &Job) -> Result<bool, Failure> {
+    if arguments.arcs && job.dialect.space != Space::Part {
+        let name = job.dialect.name;
+        let what = format!("--arcs: dialect {name} has no arcs that run as they are meant");
+        let hint = match job.dialect.space {
+            Space::Joints => "circles about the axis are one move anyway",
+            _ => "polar firmwares cut arcs as coarsely as they like, near the axis too",
+        };
+        return Err(Failure::new("ConfigConflict", what).hint(hint));
+    }
+    Ok(arguments.arcs)
+}
+
+/// The models that are filled other than the rest.
+fn own_settings(arguments: &Slice, settings: &Settings) -> Result<Vec<Own>, Failure> {
+    let mut each: BTreeMap<usize, (Settings, Vec<String>)> = BTreeMap::new();
+    let n_models = arguments.models.len();
+    for text in &arguments.object {
+        let wrong = || Failure::new("Usage", format!("--object {text:?} is not N:KEY=VALUE"));
+        let (number, pair) = text.split_once(':').ok_or_else(wrong)?;
+        let number: usize = number.trim().parse().map_err(|_| wrong())?;
+        if number == 0 || number > n_models {
+            let what = format!("--object {text:?}: there are models 1 to {n_models}");
+            return Err(Failure::new("Usage", what));
+        }
+        let (own, said) = each.entry(number - 1).or_insert_with(|| (settings.clone(), Vec::new()));
+        own.set(pair)?;
+        said.push(pair.to_owned());
+    }
+    if each.is_empty() {
+        return Ok(Vec::new());
+    }
+    let common = Job::resolve(settings)?;
+    let resolved = |(model, (own, said)): (usize, (Settings, Vec<String>))| {
+        let own = Job::resolve(&own)?;
+        let paths = own.paths;
+        // What does not lie in an object alone is the same for all.
+        let same = PathParams {
+            adhesion: common.paths.adhesion,
+            vase: common.paths.vase,
+            tolerance: common.paths.tolerance,
+            ..paths
+        };
+        if same != paths || (Job { paths: common.paths, ..own }) != common {
+            let number = model + 1;
+            let what = format!("--object {number}: {} concern the whole print", said.join(", "));
+            return Err(Failure::new("ConfigConflict", what)
+                .hint("a model alone may have its own walls, skins, infill and moved outlines"));
+        }
+        Ok(Own { model, paths, said })
+    };
+    each.into_iter().map(resolved).collect()
 }
 
 fn fill(mut file: Output, bytes: &[u8]) -> Result<(), Failure> {

@@ -84,6 +84,8 @@ pub struct Job {
     pub labels: Option<LabelWords>,
     /// Whether the program tells how far it is.
     pub tells_progress: bool,
+    /// Whether runs of lines on a circle become arcs.
+    pub draws_arcs: bool,
     /// Most cuts of a facet by a layer; not a setting of the print, but of how long to work for it.
     pub most_cuts: f64,
     /// Program before the print.
@@ -160,6 +162,7 @@ impl Job {
             },
             labels: labels(&get, &dialect),
             tells_progress: get.switch("remaining_times") && dialect.progress(0, 0).is_some(),
+            draws_arcs: false,
             most_cuts: MOST_CUTS,
             start: start(&get, &dialect, settings)?,
             end: template::fill(get.text("end_gcode"), "end_gcode", settings)?,

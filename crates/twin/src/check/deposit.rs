@@ -40,6 +40,9 @@ pub const SLACK: f64 = 0.013;
 /// Beads farther out than this are said to lie where the part is not, mm.
 const FAR_OUT: f64 = 1.0;
 
+/// Share of the layer's thickness above which a bead in a slope counts as the whole one.
+const WHOLE: f64 = 0.9;
+
 /// The mesh, as curved layers need it.
 #[derive(Debug)]
 pub(crate) struct Solid<'a> {
@@ -135,6 +138,11 @@ impl Deposit {
                 return;
             }
             self.is_sound = !exceeds(off, rounding::IN_PLANE);
+        }
+        // So does it on curved layers, in a half of the layer: its middle is not that of the whole bead.
+        let is_whole = |t: f64| t >= WHOLE * 2.0 * self.half_height;
+        if segment.slopes && !segment.thickness(self.filament_area).is_some_and(is_whole) {
+            return;
         }
         let middle = segment.middle(&self.alignment);
         let along = to - from;

@@ -9,6 +9,7 @@
 //! ones).
 
 use machine::gcode::dialect::Dialect;
+use machine::gcode::dialect::Space;
 use machine::gcode::{Code, Command, MOST_COLUMNS, SyntaxError, printable};
 
 use crate::finding::{Findings, Place};
@@ -121,6 +122,7 @@ impl Text {
         }
         match command.code {
             Code::Numbered(b'G', 1, 0) => self.motion(command, place, findings),
+            Code::Numbered(b'G', 2 | 3, 0) if is_arc(command, &self.dialect) => {}
             Code::Numbered(b'G', number @ (0 | 2 | 3 | 5), 0) => {
                 findings.error(NAME, place, (f64::from(number), 1.0), || {
                     format!("motion by G{number}, which firmwares run differently; only G1 is safe")
@@ -196,6 +198,16 @@ fn is_on_list(code: Code<'_>) -> bool {
         Code::Numbered(b'M', number, 0) => MACHINE.contains(&number),
         _ => false,
     }
+}
+
+/// Whether a command is an arc about a centre, in a dialect whose firmwares run all of them alike.
+pub(crate) fn is_arc(command: &Command<'_>, dialect: &Dialect) -> bool {
+    let is_code = matches!(command.code, Code::Numbered(b'G', 2 | 3, 0));
+    let has = |letters: &[u8]| letters.iter().all(|letter| command.word(*letter).is_some());
+    is_code
+        && dialect.space == Space::Part
+        && has(b"XYIJ")
+        && command.letter_besides(b"XYZIJEF").is_none()
 }
 
 fn is_motion(code: Code<'_>) -> bool {
