@@ -331,12 +331,18 @@ fn flat_tops_that_stay_steps_are_named() {
         let (report, _) = proved(name, &layers);
         let warnings = report["warnings"].as_array().unwrap();
         let stepped = warnings.iter().find(|warning| warning["code"] == "FlatTopsStepped");
-        stepped.map(|warning| warning["message"].as_str().unwrap().to_owned())
+        let message = stepped.map(|warning| warning["message"].as_str().unwrap().to_owned())?;
+        Some((message, report["layers"]["flats_stepped"].clone()))
     };
-    let message = named("steps", "top=planar").unwrap();
-    for (height, is_named) in [("3.07", true), ("7.33", true), ("11.9", true), ("15", false)] {
-        assert_eq!(message.contains(&format!("z = {height} mm")), is_named, "{message}");
+    let (message, faces) = named("steps", "top=planar").unwrap();
+    for (height, above) in [("3.07", Some("11.93")), ("7.33", Some("7.67")), ("15", None)] {
+        let said = message.contains(&format!("z = {height} mm"));
+        assert_eq!(said, above.is_some(), "{message}");
+        let why = |above: &str| format!("the part goes on {above} mm above it");
+        assert!(above.is_none_or(|above| message.contains(&why(above))), "{message}");
     }
+    assert_eq!(faces.as_array().unwrap().len(), 3, "{faces}");
+    assert!((faces[0]["z_mm"].as_f64().unwrap() - 3.07).abs() < 1e-6, "{faces}");
     assert_eq!(named("steps", "top=curved"), None);
     assert_eq!(named("cube", "top=planar"), None);
 }

@@ -17,6 +17,7 @@ mod corpus;
 mod corpus_made;
 mod curve;
 mod curved;
+mod curved_walls;
 mod golden;
 mod house;
 mod interrupt;

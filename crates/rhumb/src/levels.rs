@@ -30,6 +30,30 @@ pub struct MetFlat {
     pub wanted: bool,
 }
 
+/// A flat face that planar layers were to finish and do not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteppedFlat {
+    /// The face.
+    pub flat: Flat,
+    /// How far the part goes on above it, mm. Zero for its top, which is left when no curved layer
+    /// would fit below the planar ones.
+    pub below_top: f64,
+}
+
+impl SteppedFlat {
+    /// Why it is left, in words.
+    fn why(&self) -> String {
+        if self.below_top > 0.0 {
+            let above = decimal(self.below_top, 3);
+            format!(
+                "the part goes on {above} mm above it, and the nozzle would reach down beside that"
+            )
+        } else {
+            "no curved layer would fit below the planar ones".into()
+        }
+    }
+}
+
 /// The layers, and what became of the flat faces.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Layout {
@@ -38,7 +62,7 @@ pub struct Layout {
     /// The flat faces, from the bed up.
     pub flats: Vec<MetFlat>,
     /// Flat faces facing up that planar layers were to finish, and that curved ones end on in steps.
-    pub stepped: Vec<MetFlat>,
+    pub stepped: Vec<SteppedFlat>,
     /// What is still a hit, mm: half an increment, and the rounding of a level.
     pub tolerance: f64,
 }
@@ -155,11 +179,10 @@ impl Layout {
                 1 => "1 flat top is".into(),
                 count => format!("{count} flat tops are"),
             };
-            let places: Vec<String> = self.stepped.iter().map(place).collect();
+            let places: Vec<String> = self.stepped.iter().map(left_over).collect();
             let message = format!(
-                "{faces} left to the curved layers, which end there in steps: {}; planar layers \
-                 finish the highest one only, where curved ones fit below",
-                places.join(", ")
+                "{faces} left to the curved layers, which end there in steps: {}",
+                places.join("; ")
             );
             warnings.push(Warning { code: "FlatTopsStepped".into(), message });
         }
@@ -203,6 +226,17 @@ impl Layout {
             .collect()
     }
 
+    /// The flat tops that stay steps, as the report shows them.
+    #[must_use]
+    pub fn report_stepped(&self) -> Vec<report::FlatLeft> {
+        let shown = |left: &SteppedFlat| report::FlatLeft {
+            z_mm: tidy(left.flat.z_mm),
+            area_mm2: tidy(left.flat.area_mm2),
+            why: left.why(),
+        };
+        self.stepped.iter().map(shown).collect()
+    }
+
     /// One line for people; `None` when there is nothing to say.
     #[must_use]
     pub fn summary(&self) -> Option<String> {
@@ -212,9 +246,9 @@ impl Layout {
     }
 }
 
-fn place(met: &MetFlat) -> String {
-    let Flat { z_mm, area_mm2, .. } = met.flat;
-    format!("z = {} mm ({} mm²)", decimal(z_mm, 3), decimal(area_mm2, 2))
+fn left_over(left: &SteppedFlat) -> String {
+    let Flat { z_mm, area_mm2, .. } = left.flat;
+    format!("z = {} mm ({} mm²): {}", decimal(z_mm, 3), decimal(area_mm2, 2), left.why())
 }
 
 fn faces(count: usize) -> String {

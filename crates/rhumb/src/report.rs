@@ -96,6 +96,9 @@ pub struct Layers {
     pub heights_mm: Vec<f64>,
     /// Flat faces and how far the nearest layer misses them.
     pub flats: Vec<Flat>,
+    /// Flat tops that planar layers were to finish (`top = planar`) and that stay steps.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub flats_stepped: Vec<FlatLeft>,
     /// Area too thin for any bead, summed over the layers.
     pub lost_mm2: f64,
     /// Share of the part that is not too thin for a bead.
@@ -165,6 +168,17 @@ pub struct Flat {
     pub facing: &'static str,
     /// Whether it is too small to be met on purpose.
     pub ignored: bool,
+}
+
+/// A flat top that stays a flight of steps.
+#[derive(Debug, Clone, Serialize)]
+pub struct FlatLeft {
+    /// Its height.
+    pub z_mm: f64,
+    /// Its area.
+    pub area_mm2: f64,
+    /// The reason, in words.
+    pub why: String,
 }
 
 /// The print.

@@ -28,7 +28,7 @@ use slicer::surface::{Caps, Cone, Extent, LayerSurface, Plane, Spheres, SurfaceE
 
 use crate::blend;
 use crate::failure::Failure;
-use crate::levels::{self, Layout, MetFlat};
+use crate::levels::{self, Layout, MetFlat, SteppedFlat};
 use crate::settings::Job;
 
 /// The surface that layers follow, as the user names it.
@@ -176,7 +176,7 @@ pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure>
     let all = |more: Vec<Stage>| below.into_iter().chain(more).collect();
     let top = flat_top(&layout, part).filter(|_| job.planar_top);
     let Some(finish) = top.and_then(|top| finish(top, stand, job)) else {
-        let stepped = stepped(&layout, |_| job.planar_top);
+        let stepped = if job.planar_top { stepped(&layout, part, |_| true) } else { Vec::new() };
         return Ok((all(vec![curved]), Layout { flats: Vec::new(), stepped, ..layout }));
     };
     let first = &finish.levels[finish.printed.start];
@@ -184,7 +184,7 @@ pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure>
     // The other faces are met by no layer on purpose.
     let on_top = |met: &&MetFlat| is_top(met, part);
     let flats = layout.flats.iter().filter(on_top).map(|met| MetFlat { miss: 0.0, ..*met });
-    let (flats, stepped) = (flats.collect(), stepped(&layout, |met| !is_top(met, part)));
+    let (flats, stepped) = (flats.collect(), stepped(&layout, part, |met| !is_top(met, part)));
     let layout = Layout { flats, stepped, ..layout };
     Ok((all(vec![curved, finish]), layout))
 }
@@ -198,9 +198,13 @@ fn is_top(met: &MetFlat, part: &Mesh) -> bool {
 }
 
 /// The flat faces facing up that a print is asked to finish, as far as `is_left` tells.
-fn stepped(layout: &Layout, is_left: impl Fn(&MetFlat) -> bool) -> Vec<MetFlat> {
+fn stepped(layout: &Layout, part: &Mesh, is_left: impl Fn(&MetFlat) -> bool) -> Vec<SteppedFlat> {
     let faces_up = |met: &&MetFlat| met.wanted && met.flat.facing == Facing::Up && is_left(met);
-    layout.flats.iter().filter(faces_up).copied().collect()
+    let left = |met: &MetFlat| {
+        let below_top = if is_top(met, part) { 0.0 } else { part.bounds().max.z - met.flat.z_mm };
+        SteppedFlat { flat: met.flat, below_top }
+    };
+    layout.flats.iter().filter(faces_up).map(left).collect()
 }
 
 /// The height of the flat face on top of a part.

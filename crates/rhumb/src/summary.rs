@@ -61,6 +61,7 @@ pub fn report(
             levels_mm: outcome.layout.levels.iter().map(|level| tidy(level.upper)).collect(),
             heights_mm: outcome.heights.iter().map(|&height| tidy(height)).collect(),
             flats: outcome.layout.report(),
+            flats_stepped: outcome.layout.report_stepped(),
             lost_mm2: outcome.lost.area,
             covered_share: 1.0 - outcome.lost_volume / volume,
             weighed: outcome.choice.as_ref().map(weighed),

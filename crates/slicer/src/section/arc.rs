@@ -106,6 +106,9 @@ impl<'a> Cut<'a> {
         points: &mut Vec<Point3<f64>>,
     ) {
         let chord = enter - leave;
+        if self.is_near(leave, enter, &chord) {
+            return;
+        }
         let Some((shoulder, deviation)) = self.shoulder(leave, enter, &chord) else { return };
         if deviation <= self.tolerance || halvings == 0 || !self.holds(&shoulder) {
             return;
@@ -113,6 +116,18 @@ impl<'a> Cut<'a> {
         self.split(&shoulder, enter, halvings - 1, points);
         points.push(shoulder);
         self.split(leave, &shoulder, halvings - 1, points);
+    }
+
+    /// Whether the curve is plainly near enough to its chord: from the middle of that, F grows to the
+    /// right at least as fast as it begins to. A single root tells it of nearly all chords of fine
+    /// meshes.
+    fn is_near(&self, leave: &Point3<f64>, enter: &Point3<f64>, chord: &Vector3<f64>) -> bool {
+        let right = chord.cross(&self.normal);
+        let (value, growth) = self.form.value_and_growth(&center(leave, enter), &right);
+        let lacking = self.value - value;
+        // Half the tolerance: the farthest place need not lie over the middle.
+        let least = self.tolerance / 2.0 * growth;
+        growth > 0.0 && lacking * lacking * right.norm_squared() <= least * least
     }
 
     /// The shoulder over a chord from `leave` to `enter` and its distance from the chord, mm;

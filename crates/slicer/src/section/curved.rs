@@ -48,8 +48,19 @@ impl Field<'_> {
     /// The least F of a facet when that is not at one of its corners.
     pub(super) fn low(&self, facet: u32) -> Option<f64> {
         let vertices = self.solid.mesh().triangles[facet as usize];
-        let corners = vertices.map(|v| self.at(v));
         let values = vertices.map(|v| self.value(v));
+        let lowest = least_of(&values);
+        let from = self.at(vertices[lowest]);
+        // F that rises from the lowest corner along both sides rises into the facet: only a corner
+        // on the axis of cones may have a furrow between.
+        let falls = |k: usize| {
+            let to = self.at(vertices[(lowest + k) % 3]);
+            self.form.falls_towards(&from, values[lowest], &to)
+        };
+        if !falls(1) && !falls(2) && (from.x != 0.0 || from.y != 0.0) {
+            return None;
+        }
+        let corners = vertices.map(|v| self.at(v));
         let dips = |i: usize, j: usize| {
             let (low, high) = if values[i] <= values[j] { (i, j) } else { (j, i) };
             self.form.falls_towards(&corners[low], values[low], &corners[high])
@@ -101,6 +112,17 @@ impl Field<'_> {
 
     fn value(&self, v: u32) -> f64 {
         self.form.value_of_level(self.vertex_levels[v as usize])
+    }
+}
+
+fn least_of(values: &[f64; 3]) -> usize {
+    let [a, b, c] = *values;
+    if a <= b && a <= c {
+        0
+    } else if b <= c {
+        1
+    } else {
+        2
     }
 }
 

@@ -130,6 +130,29 @@ impl Form {
         }
     }
 
+    /// Returns F at `p` and by how much it begins to grow on the way along `along`; not a number
+    /// where that has no direction.
+    #[must_use]
+    pub fn value_and_growth(&self, p: &Point3<f64>, along: &Vector3<f64>) -> (f64, f64) {
+        let inner = p.x * along.x + p.y * along.y;
+        let square = p.x * p.x + p.y * p.y;
+        match self.kind {
+            Kind::Plane => (p.z, along.z),
+            Kind::Cone { slope } => {
+                let r = square.sqrt();
+                (p.z + slope * r, along.z + slope * inner / r)
+            }
+            Kind::Spheres { centre_z } => {
+                let up = p.z - centre_z;
+                (self.value(p), (inner + up * along.z) / (square + up * up).sqrt())
+            }
+            Kind::Caps { radius } => {
+                let rise = (radius * radius - square).max(0.0).sqrt();
+                (p.z + square / (radius + rise), along.z + inner / rise)
+            }
+        }
+    }
+
     /// Returns the quadratic of the layer `value` along a line.
     #[must_use]
     pub fn quadratic(&self, value: f64, a: &Point3<f64>, along: &Vector3<f64>) -> Quadratic {
@@ -286,6 +309,22 @@ mod tests {
         *seed =
             seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (*seed >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    #[test]
+    fn the_growth_is_the_derivative() {
+        let seed = &mut 3;
+        for form in forms() {
+            for _ in 0..100 {
+                let mut point = || Point3::from([(); 3].map(|()| 40.0 * random(seed) - 20.0));
+                let (p, along) = (point(), point().coords);
+                let (value, growth) = form.value_and_growth(&p, &along);
+                assert!((value - form.value(&p)).abs() < 1e-12);
+                let step = 1e-6;
+                let [before, after] = [-step, step].map(|step| form.value(&(p + along * step)));
+                assert!((growth - (after - before) / (2.0 * step)).abs() < 1e-5 * along.norm());
+            }
+        }
     }
 
     #[test]

@@ -6,9 +6,10 @@
 //! * Of each role the middle bead of the planar layers agrees to [`OFF`].
 //! * One by one they may differ by [`DRIFT`], as a width that changes along a line is announced in
 //!   steps, and by the volumes [`BLOB`] and [`LACK`], which nobody sees.
-//! * Beads of curved layers may be from [`THINNEST`] to [`THICKEST`] of their layer, as wedges on a
-//!   flat floor are. So may those of the first planar layer on curved ones, which fills the wedges
-//!   that these leave below it; along their normal, that is.
+//! * Beads of curved layers may be from [`THINNEST`] to [`THICKEST`] of their layer where they are
+//!   wedges on the flat layers below, and wherever the layer below is of another shape, as in a blend.
+//!   Higher up they are as thick as their layer, of caps as thick as these are there. Wedges fill as
+//!   well what curved layers leave below the first planar one on them; along their normal, that is.
 //!
 //! No line asks for more volume in a second than melts, where its speed is its own: at the pace of a
 //! firmware, within a few mm of the axis, the top speed is only a bound, which ramps never reach.
@@ -74,6 +75,10 @@ pub(crate) struct Flow {
     mark: Option<LayerMark>,
     /// The curved family that this planar layer lies on.
     ground: Option<Family>,
+    /// The top of the last planar layer, mm: curved layers end on it in wedges.
+    floor: f64,
+    /// Whether the layer below is one of the same family.
+    goes_on: bool,
     /// Length of the planar beads of each role by their share of what is announced.
     classes: [Vec<f64>; Role::ALL.len()],
 }
@@ -89,6 +94,8 @@ impl Flow {
             clearance: printer.axis_clearance,
             mark: None,
             ground: None,
+            floor: 0.0,
+            goes_on: false,
             classes: Default::default(),
         }
     }
@@ -98,6 +105,10 @@ impl Flow {
         let before = self.mark.map(family).unwrap_or_default();
         let begins = family(mark) == Family::Planar && before != Family::Planar;
         self.ground = begins.then_some(before);
+        if family(mark) == Family::Planar {
+            self.floor = mark.top.unwrap_or(f64::INFINITY);
+        }
+        self.goes_on = before == Family::Planar || before == family(mark);
         self.mark = Some(mark);
     }
 
@@ -118,17 +129,7 @@ impl Flow {
             + FILAMENT / segment.filament
             + (area(segment.width + WIDTH, height) / announced - 1.0);
         let is_planar = mark.family.unwrap_or_default() == Family::Planar;
-        let [least, most] = match self.ground {
-            // The first turn of a vase begins without thickness.
-            _ if mark.climbs => [0.0, THICKEST],
-            // As thin as nothing where a slope begins or ends.
-            _ if segment.slopes => [0.0, THICKEST],
-            _ if !is_planar => [THINNEST, THICKEST],
-            Some(ground) => {
-                [THINNEST, THICKEST / ground.normal(&segment.middle(&self.alignment)).z]
-            }
-            None => [1.0 - DRIFT, 1.0 + DRIFT],
-        };
+        let [least, most] = self.limits(segment, &mark, height);
         let volume = announced * segment.path;
         let over = (share - most - rounded) * volume;
         let under = (least - rounded - share) * volume;
@@ -152,6 +153,31 @@ impl Flow {
                 classes.resize(class + 1, 0.0);
             }
             classes[class] += segment.path;
+        }
+    }
+
+    /// The least and the greatest share of the announced cross-section.
+    fn limits(&self, segment: &Segment, mark: &LayerMark, height: f64) -> [f64; 2] {
+        let family = mark.family.unwrap_or_default();
+        let upright = |family: Family| family.normal(&segment.middle(&self.alignment)).z;
+        match self.ground {
+            // The first turn of a vase begins without thickness.
+            _ if mark.climbs => [0.0, THICKEST],
+            // As thin as nothing where a slope begins or ends.
+            _ if segment.slopes => [0.0, THICKEST],
+            Some(ground) => [THINNEST, THICKEST / upright(ground)],
+            None if family == Family::Planar => [1.0 - DRIFT, 1.0 + DRIFT],
+            None => {
+                let slope = upright(family);
+                let lowest = segment.part[0].z.min(segment.part[1].z);
+                let is_wedge = (lowest - self.floor) / slope < THICKEST * height;
+                if is_wedge || !self.goes_on {
+                    return [THINNEST, THICKEST];
+                }
+                // Caps are as thick upright everywhere.
+                let usual = if matches!(family, Family::Caps { .. }) { slope } else { 1.0 };
+                [usual - DRIFT, usual + DRIFT]
+            }
         }
     }
 
@@ -201,8 +227,12 @@ mod tests {
     use crate::sample::{part_segment, printer};
     use nalgebra::Point3;
 
-    /// What is found of a hundred beads with this share of the announced cross-section.
     fn found(share: f64, family: Option<Family>) -> Vec<f64> {
+        found_at(0.2, share, family)
+    }
+
+    /// What is found of a hundred beads at this height with this share of the announced cross-section.
+    fn found_at(z: f64, share: f64, family: Option<Family>) -> Vec<f64> {
         let printer = Printer { axis_clearance: 0.02, ..printer() };
         let (mut check, mut findings) =
             (Flow::new(&printer, 2.0, f64::INFINITY), Findings::default());
@@ -215,7 +245,7 @@ mod tests {
             climbs: false,
         });
         for k in 0..110 {
-            let at = |x: f64| Point3::new(x, 5.0 + f64::from(k), 0.2);
+            let at = |x: f64| Point3::new(x, 5.0 + f64::from(k), z);
             let mut segment = part_segment(at(0.0), at(20.0));
             segment.role = Role::Perimeter;
             segment.filament = share * area(0.45, 0.2) * 20.0 / 2.0;
@@ -256,5 +286,17 @@ mod tests {
         assert!(found(1.3, cone).is_empty() && found(0.55, cone).is_empty());
         assert_eq!(found(0.3, cone)[0], THINNEST);
         assert_eq!(found(1.9, cone)[0], THICKEST);
+    }
+
+    #[test]
+    fn curved_beads_off_the_floor_are_as_thick_as_their_layer() {
+        let cone = Some(Family::Conical { slope: 0.5 });
+        assert!(found_at(2.0, 1.02, cone).is_empty());
+        assert_eq!(found_at(2.0, 1.3, cone)[0], 1.0 + DRIFT);
+        assert_eq!(found_at(2.0, 0.6, cone)[0], 1.0 - DRIFT);
+        // A cap that falls by 60° at 100 mm, where it is half as thick.
+        let caps = Some(Family::Caps { radius: 120.0 });
+        assert!(found_at(2.0, 0.6, caps).iter().all(|limit| *limit > 0.6));
+        assert!(found_at(2.0, 0.95, caps).iter().all(|limit| *limit < 0.95));
     }
 }
