@@ -8,7 +8,7 @@
 //! Bodies are exact, without facets: a frustum is the hull of two discs, a bead the points within a
 //! radius of a flat core. mm.
 
-use nalgebra::{Point3, Vector2, Vector3};
+use nalgebra::{Point3, Rotation3, Vector2, Vector3};
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query::details::contact_support_map_support_map;
 use parry3d_f64::shape::SupportMap;
@@ -75,6 +75,13 @@ impl Bead {
             half: [along, across.unwrap_or(any) * half_width],
             radius,
         }
+    }
+
+    /// Returns the bead turned about a point.
+    #[must_use]
+    pub fn turned_about(&self, point: &Point3<f64>, by: &Rotation3<f64>) -> Self {
+        let centre = point + by * (self.centre - point);
+        Self { centre, half: self.half.map(|half| by * half), radius: self.radius }
     }
 
     fn top(&self) -> f64 {

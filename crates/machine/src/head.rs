@@ -103,6 +103,17 @@ impl Head {
         }
     }
 
+    /// Returns how far the nozzle may lean inwards (negative) and outwards, radians.
+    #[must_use]
+    pub fn tilts(&self) -> [f64; 2] {
+        match self {
+            Self::Tilting(head) => {
+                head.axes.last().map_or([0.0; 2], |tilt| [tilt.axis.min, tilt.axis.max])
+            }
+            Self::Hexapod(head) => [-head.joints.tilt, head.joints.tilt],
+        }
+    }
+
     /// Returns whether carriage and lift are drives of their own.
     #[must_use]
     pub fn has_carriage(&self) -> bool {

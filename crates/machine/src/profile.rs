@@ -46,6 +46,8 @@ pub struct Printer {
     /// Most turns of the bed from where it was homed, either way, radians; infinite where no wire
     /// runs to the bed.
     pub most_turn: f64,
+    /// What turns the nozzle, where it does not always stand upright.
+    pub head: Option<crate::head::Head>,
 }
 
 /// The outline of nozzle and hot end, turned about the nozzle's axis: a flat face around the bore, a

@@ -202,6 +202,27 @@ pub struct Arc {
     pub clockwise: bool,
 }
 
+/// A move of a machine whose head turns the nozzle: straight in what its drives stand at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Posed {
+    /// Its place in the part, filament and time. The joints are those that would bring an upright
+    /// nozzle to the same place.
+    pub motion: Move,
+    /// Where the drives end up.
+    pub stance: crate::head::Stance,
+    /// How far the point about which the nozzle turns runs round its tip, mm.
+    pub swing: f64,
+}
+
+impl Posed {
+    /// Returns the way that `F` speaks of, mm: that of the tip over the part, or of the point that the
+    /// nozzle is turned about round the tip, where that is longer.
+    #[must_use]
+    pub fn way(&self) -> f64 {
+        if self.motion.path > 0.0 { self.motion.path.max(self.swing) } else { 0.0 }
+    }
+}
+
 /// One step of a program.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
@@ -209,6 +230,8 @@ pub enum Step {
     Move(Move),
     /// A move along a circle, for firmwares that take part coordinates and draw circles.
     Arc(Arc),
+    /// A move of a machine whose head turns the nozzle.
+    Posed(Box<Posed>),
     /// A new layer begins.
     Layer(Layer),
     /// What the following moves lay, and the width of the bead, mm.

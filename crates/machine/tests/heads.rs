@@ -107,7 +107,7 @@ fn hexapod(case: &Value, base_half: f64, platform_half: f64) -> (Hexapod, Layout
         platform_half_angle: platform_half,
     };
     let home = Vector3::new(0.0, 0.0, layout.height_at_45());
-    let limits = JointLimits { cone: 1.0, home, apart: 0.0, condition: 1e3 };
+    let limits = JointLimits { cone: 1.0, home, apart: 0.0, condition: 1e3, tilt: 0.7 };
     (Hexapod::new(layout.joints(), 0.0, ANY, limits), layout)
 }
 

@@ -5,7 +5,7 @@
 //! which and [`seam`] where closed ones begin; [`route`] puts travel, retraction and lift between
 //! them, clear of what is
 //! [`printed`]; [`axis`] bends what would graze the rotation axis and [`resample`] turns strokes over the
-//! part into joint moves; [`speed`] finds the durations that the axes can keep, [`cooling`]
+//! part into joint moves, [`tilt`] those into moves of heads that turn the nozzle; [`speed`] finds the durations that the axes can keep, [`cooling`]
 //! stretches short layers, [`time`] estimates how long the print takes; [`planner`] runs it all,
 //! layer by layer.
 
@@ -26,6 +26,7 @@ pub mod scarf;
 pub mod seam;
 pub mod slow_flow;
 pub mod speed;
+pub mod tilt;
 pub mod time;
 mod winding;
 

@@ -1,9 +1,11 @@
 //! The planner: one layer after the other becomes steps of the program.
 
+use machine::gcode::dialect::{CARTESIAN, Space};
 use machine::kinematics::Unreachable;
 use machine::profile::Printer;
-use machine::program::{Arc, Joints, Move, Role, Step};
+use machine::program::{Arc, Joints, Move, Posed, Role, Step};
 use nalgebra::{Point2, Point3, Vector3};
+use slicer::surface::{Form, LayerSurface, Plane};
 use slicer::toolpath::LayerPaths;
 
 use crate::acceleration::Accelerations;
@@ -18,7 +20,8 @@ use crate::route::{FilamentParams, Item, Kind, Router, Speeds, Stroke};
 use crate::scarf::{ScarfParams, ScarfPlacement};
 use crate::seam::SeamMemory;
 use crate::slow_flow::{FlowWatch, SlowFlow};
-use crate::speed::{Limits, Pace, gentle_durations, taken, travels};
+use crate::speed::{Limits, Pace, Travel, gentle_durations, posed_durations, taken, travels};
+use crate::tilt::{PosedLegs, TiltParams, Tilter};
 use crate::time;
 
 /// Choices of the plan.
@@ -42,6 +45,8 @@ pub struct PlanParams {
     pub heat: HeatParams,
     /// Whether layers are curved, so that travel must look out for what is printed.
     pub curved: bool,
+    /// How far nozzles that can be turned are tilted.
+    pub tilt: TiltParams,
 }
 
 /// Fan and temperature over the layers.
@@ -114,6 +119,9 @@ pub struct Totals {
     pub slow_flow: SlowFlow,
     /// Length of the beads that the firmware runs at a pace of its own, mm.
     pub paced: f64,
+    /// Greatest angle between the nozzle and where it should have pointed, radians: what a head with
+    /// one tilt axis cannot follow.
+    pub residual: f64,
 }
 
 impl Totals {
@@ -199,6 +207,9 @@ pub struct Planner<'a> {
     is_first_layer: bool,
     /// The acceleration that was told last, mm/s².
     acceleration: f64,
+    tilter: Option<Tilter>,
+    /// In which coordinates moves are straight, but for what a head makes of them.
+    space: Space,
 }
 
 impl<'a> Planner<'a> {
@@ -207,13 +218,22 @@ impl<'a> Planner<'a> {
     pub fn new(printer: &'a Printer, mut params: PlanParams) -> Self {
         params.resample.dialect = params.resample.dialect.on(printer);
         params.order.seam = params.order.seam.seen_from(params.resample.azimuth);
-        let resampler = Resampler::new(printer, params.resample);
-        let resampler = if params.curved { resampler.on_near_side() } else { resampler };
+        let dialect = params.resample.dialect;
+        let chords = [params.resample.chord, params.resample.travel_chord];
+        let tilter = Tilter::new(printer, params.tilt, dialect, chords);
+        let stands = printer.head.as_ref().is_some_and(|head| !head.turns_bed());
+        // Over a standing bed the tip runs straight; legs make it so.
+        let tip = if stands && tilter.is_some() { CARTESIAN } else { dialect };
+        let resampler = Resampler::new(printer, ResampleParams { dialect: tip, ..params.resample });
+        let on_near_side = params.curved || tilter.is_some();
+        let resampler = if on_near_side { resampler.on_near_side() } else { resampler };
         let printed = params.curved.then(|| Printed::nothing(printer.rail.max));
         Self {
             printer,
             params,
             limits: Limits::of(printer, params.resample.dialect.space),
+            tilter,
+            space: tip.space,
             router: Router::new(resampler.at(), printer.lift.speed, printed),
             resampler,
             seams: SeamMemory::default(),
@@ -247,6 +267,13 @@ impl<'a> Planner<'a> {
     #[must_use]
     pub fn telling_time(self) -> Self {
         Self { tells_time: true, ..self }
+    }
+
+    /// The following layers have this form, which nozzles that can be turned follow.
+    pub fn follow(&mut self, form: Form) {
+        if let Some(tilter) = &mut self.tilter {
+            tilter.follow(form);
+        }
     }
 
     /// Plans the next layer.
@@ -335,6 +362,7 @@ impl<'a> Planner<'a> {
     /// [`PlanError`], which cannot occur after a layer that was planned.
     pub fn finish(mut self) -> Result<(Vec<Step>, Totals), PlanError> {
         const CLEARANCE_MM: f64 = 5.0;
+        self.follow(Plane.form());
         let lift = CLEARANCE_MM.min(self.printer.lift.max - self.router.at().z).max(0.0);
         let items = self.router.leave(lift, &self.params.filament);
         let fail = |source| PlanError { layer: 0, source };
@@ -347,9 +375,11 @@ impl<'a> Planner<'a> {
             let speed = self.params.speeds.travel;
             let leg = Leg { kind: Kind::Travel, to, at, filament: 0.0, path, speed };
             let gentle = [self.params.accelerations.of_travel()];
-            steps.extend(self.timed(vec![vec![leg]], from, &gentle).into_iter().flatten());
+            let timed = self.timed(vec![vec![leg]], from, &gentle).map_err(fail)?;
+            steps.extend(timed.into_iter().flatten());
         }
-        Ok((steps, Totals { slow_flow: self.flow.found(), ..self.totals }))
+        let residual = self.tilter.as_ref().map_or(0.0, Tilter::residual);
+        Ok((steps, Totals { slow_flow: self.flow.found(), residual, ..self.totals }))
     }
 
     fn heat(&mut self, index: usize, fan: f64) -> Vec<Step> {
@@ -419,7 +449,7 @@ impl<'a> Planner<'a> {
             .collect();
         let start = self.resampler.joints();
         let legs = self.resampler.legs(&strokes)?;
-        let mut moves = self.timed_by_role(legs, start, &items).into_iter();
+        let mut moves = self.timed_by_role(legs, start, &items)?.into_iter();
         let mut steps = Vec::new();
         for item in items {
             match item {
@@ -437,7 +467,7 @@ impl<'a> Planner<'a> {
         legs: Vec<Vec<Leg>>,
         start: Joints,
         items: &[Item],
-    ) -> Vec<Vec<Step>> {
+    ) -> Result<Vec<Vec<Step>>, Unreachable> {
         let mut groups = legs.iter();
         let wanted = self.params.accelerations;
         let mut accelerations = Vec::new();
@@ -467,37 +497,79 @@ impl<'a> Planner<'a> {
     }
 
     /// Gives every leg its duration.
-    fn timed(&mut self, groups: Vec<Vec<Leg>>, start: Joints, wanted: &[f64]) -> Vec<Vec<Step>> {
-        let sizes: Vec<usize> = groups.iter().map(Vec::len).collect();
-        let mut legs: Vec<Leg> = groups.into_iter().flatten().collect();
-        let travels = travels(&legs, start);
-        let durations = |legs: &[Leg], pace: Pace, limits: &Limits| {
-            gentle_durations(legs, &travels, pace, limits, wanted)
+    fn timed(
+        &mut self,
+        groups: Vec<Vec<Leg>>,
+        start: Joints,
+        wanted: &[f64],
+    ) -> Result<Vec<Vec<Step>>, Unreachable> {
+        let Some(tilter) = &mut self.tilter else {
+            let (sizes, legs) = flattened(groups);
+            let travels = travels(&legs, start);
+            let law = |legs: &[Leg], pace: Pace, limits: &Limits| {
+                gentle_durations(legs, &travels, pace, limits, wanted)
+            };
+            let moves = self.timed_by(legs, &travels, start, wanted, law);
+            return Ok(self.grouped(&sizes, moves.into_iter().map(Step::Move), wanted));
         };
-        let (mut times, mut pace) = durations(&legs, self.pace, &self.limits);
+        let from = tilter.stance();
+        let PosedLegs { groups, stances, swings, origins } = tilter.legs(groups)?;
+        let wanted: Vec<f64> = origins.iter().filter_map(|&k| wanted.get(k).copied()).collect();
+        let (sizes, legs) = flattened(groups);
+        let travels = travels(&legs, start);
+        let law = |legs: &[Leg], pace: Pace, limits: &Limits| {
+            posed_durations(legs, (&from, &stances), pace, limits, &wanted)
+        };
+        let moves = self.timed_by(legs, &travels, start, &wanted, law);
+        let steps = moves.into_iter().zip(stances.iter().zip(&swings)).map(
+            |(motion, (&stance, &swing))| Step::Posed(Box::new(Posed { motion, stance, swing })),
+        );
+        Ok(self.grouped(&sizes, steps, &wanted))
+    }
+
+    /// Gives legs the durations of a law of speed, and counts them.
+    fn timed_by(
+        &mut self,
+        mut legs: Vec<Leg>,
+        travels: &[Travel],
+        start: Joints,
+        wanted: &[f64],
+        law: impl Fn(&[Leg], Pace, &Limits) -> (Vec<f64>, Pace),
+    ) -> Vec<Move> {
+        let (mut times, mut pace) = law(&legs, self.pace, &self.limits);
         let least_feed = self.params.filament.least_flow / self.params.filament.area;
         if slow_down(&mut legs, &times, &self.params.cooling, least_feed) {
-            (times, pace) = durations(&legs, self.pace, &self.limits);
+            (times, pace) = law(&legs, self.pace, &self.limits);
         }
         self.pace = pace;
         let dialect = &self.params.resample.dialect;
         let taken = taken(&legs, start, &times, dialect);
         self.totals.paced += taken.paced;
         let taken = taken.times;
-        let space = dialect.space;
-        self.totals.time += time::estimate(&legs, &travels, &taken, self.printer, space, wanted);
-        for (leg, travel) in legs.iter().zip(&travels) {
+        self.totals.time +=
+            time::estimate(&legs, travels, &taken, self.printer, self.space, wanted);
+        for (leg, travel) in legs.iter().zip(travels) {
             self.count(leg, travel.axes[1]);
         }
-        let mut timed = legs.iter().zip(times.iter().zip(taken.iter())).map(|(leg, times)| {
+        let moves = legs.iter().zip(times.iter().zip(taken.iter())).map(|(leg, times)| {
             let (&duration, &taken) = times;
             let motion =
                 Move { to: leg.to, at: leg.at, filament: leg.filament, path: leg.path, duration };
             self.flow.look(&Move { duration: taken, ..motion });
-            Step::Move(motion)
+            motion
         });
+        moves.collect()
+    }
+
+    /// Puts moves into groups of these sizes, with the accelerations that are told.
+    fn grouped(
+        &mut self,
+        sizes: &[usize],
+        mut steps: impl Iterator<Item = Step>,
+        wanted: &[f64],
+    ) -> Vec<Vec<Step>> {
         let groups: Vec<Vec<Step>> =
-            sizes.iter().map(|&size| timed.by_ref().take(size).collect()).collect();
+            sizes.iter().map(|&size| steps.by_ref().take(size).collect()).collect();
         if self.params.accelerations.are_wanted() { self.told(groups, wanted) } else { groups }
     }
 
@@ -539,4 +611,10 @@ impl<'a> Planner<'a> {
     pub fn at(&self) -> Point3<f64> {
         self.router.at()
     }
+}
+
+/// All legs in one list, and how many each group had.
+fn flattened(groups: Vec<Vec<Leg>>) -> (Vec<usize>, Vec<Leg>) {
+    let sizes = groups.iter().map(Vec::len).collect();
+    (sizes, groups.into_iter().flatten().collect())
 }

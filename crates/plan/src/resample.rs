@@ -91,6 +91,9 @@ const ROUNDING_MM: f64 = 1e-3;
 /// both ends of a move.
 const NEAR_AXIS_ROUNDING_MM: f64 = 2e-5;
 
+/// How far the last places of all drives of a head bring the tip from its place, mm.
+const HEAD_ROUNDING_MM: f64 = 5e-3;
+
 /// What is shorter is the last digits of one place, mm: a tenth of the finest last place.
 const LEAST_PATH_MM: f64 = 1e-6;
 
@@ -156,7 +159,8 @@ impl Resampler {
             alignment: printer.alignment,
             azimuth: Rotation2::new(params.azimuth),
             params,
-            clearance: printer.axis_clearance,
+            clearance: printer.axis_clearance
+                + if printer.head.is_some() { HEAD_ROUNDING_MM } else { 0.0 },
             rail: printer.rail,
             lift: printer.lift,
             bed_map: printer.bed_map.clone(),

@@ -20,6 +20,7 @@ use std::borrow::Cow;
 use machine::gcode::Dialect;
 use machine::gcode::dialect::Space;
 use machine::gcode::speed_word::SpeedWord;
+use machine::head::{HEAD_AXES, Head, Stance};
 use machine::profile::Printer;
 use machine::program::Joints;
 
@@ -30,7 +31,7 @@ use crate::route::Kind;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Greatest speed and acceleration, in mm and radians.
-    axes: [AxisLimit; AXES],
+    axes: [AxisLimit; MOST_AXES],
     /// mm of filament a second, either way.
     extruder_speed: f64,
     least_duration: f64,
@@ -48,6 +49,10 @@ struct AxisLimit {
 
 /// Carriage, bed, lift, and the nozzle along its path.
 const AXES: usize = 4;
+
+/// The same and the axes of a head that turns the nozzle. The law is the same for any number; few are
+/// quick.
+pub(crate) const MOST_AXES: usize = AXES + HEAD_AXES;
 
 /// The carriage among the axes.
 const RAIL: usize = 0;
@@ -80,7 +85,7 @@ const SLACK: f64 = 1e-3;
 /// The speeds of the axes in a move, and how long it lasts: what the next move joins on to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
-    speeds: [f64; AXES],
+    speeds: [f64; MOST_AXES],
     duration: f64,
     /// The way that the bed turned last: 1 or −1.
     direction: f64,
@@ -88,7 +93,7 @@ pub struct Pace {
 
 impl Pace {
     /// Standing still, for as long as one likes.
-    pub const REST: Self = Self { speeds: [0.0; AXES], duration: 0.0, direction: 1.0 };
+    pub const REST: Self = Self { speeds: [0.0; MOST_AXES], duration: 0.0, direction: 1.0 };
 }
 
 impl Limits {
@@ -101,20 +106,27 @@ impl Limits {
             speed: speed * share,
             acceleration: acceleration * share,
         };
+        let none = AxisLimit { speed: f64::INFINITY, acceleration: f64::INFINITY };
+        let mut axes = [none; MOST_AXES];
+        axes[..AXES].copy_from_slice(&[
+            limit(printer.rail.speed, printer.rail.acceleration),
+            limit(printer.bed.speed, printer.bed.acceleration),
+            AxisLimit {
+                speed: printer.lift.speed * USED_SHARE,
+                acceleration: printer.lift.acceleration * USED_SHARE,
+            },
+            // How fast the nozzle is to be is said with each leg.
+            AxisLimit {
+                speed: f64::INFINITY,
+                acceleration: printer.path_acceleration * USED_SHARE,
+            },
+        ]);
+        let head = printer.head.as_ref().map(Head::axes).unwrap_or_default();
+        for (place, of_head) in axes[AXES..].iter_mut().zip(head) {
+            *place = limit(of_head.axis.speed, of_head.axis.acceleration);
+        }
         Self {
-            axes: [
-                limit(printer.rail.speed, printer.rail.acceleration),
-                limit(printer.bed.speed, printer.bed.acceleration),
-                AxisLimit {
-                    speed: printer.lift.speed * USED_SHARE,
-                    acceleration: printer.lift.acceleration * USED_SHARE,
-                },
-                // How fast the nozzle is to be is said with each leg.
-                AxisLimit {
-                    speed: f64::INFINITY,
-                    acceleration: printer.path_acceleration * USED_SHARE,
-                },
-            ],
+            axes,
             extruder_speed: printer.extruder_speed * USED_SHARE,
             least_duration: 1.0 / printer.moves_per_second,
             polar: space != Space::Part,
@@ -230,18 +242,61 @@ pub(crate) fn gentle_durations(
     let law = Law { limits, accelerations };
     let moves: Vec<[f64; AXES]> =
         legs.iter().zip(travels).map(|(leg, travel)| distances(leg, travel)).collect();
+    durations_of(legs, &moves, before, &law)
+}
+
+/// The same of legs with a head that turns the nozzle: what every drive does in each is given.
+#[must_use]
+pub(crate) fn posed_durations(
+    legs: &[Leg],
+    (start, stances): (&Stance, &[Stance]),
+    before: Pace,
+    limits: &Limits,
+    accelerations: &[f64],
+) -> (Vec<f64>, Pace) {
+    let law = Law { limits, accelerations };
+    let mut from = start;
+    let moves: Vec<[f64; MOST_AXES]> = legs
+        .iter()
+        .zip(stances)
+        .map(|(leg, to)| {
+            let mut axes = [0.0; MOST_AXES];
+            axes[RAIL] = to.base.s - from.base.s;
+            axes[BED] = to.base.turn.radians() - from.base.turn.radians();
+            axes[LIFT] = to.base.z - from.base.z;
+            axes[PATH] = leg.path;
+            for k in 0..HEAD_AXES {
+                axes[AXES + k] = to.head[k] - from.head[k];
+            }
+            from = to;
+            axes
+        })
+        .collect();
+    durations_of(legs, &moves, before, &law)
+}
+
+fn durations_of<const N: usize>(
+    legs: &[Leg],
+    moves: &[[f64; N]],
+    before: Pace,
+    law: &Law<'_>,
+) -> (Vec<f64>, Pace) {
+    let limits = law.limits;
     let mut durations: Vec<f64> =
-        legs.iter().zip(&moves).map(|(leg, axes)| at_speed(leg, axes, limits)).collect();
+        legs.iter().zip(moves).map(|(leg, axes)| at_speed(leg, axes, limits)).collect();
     let mut direction = before.direction;
     if limits.stops_to_turn_back {
-        direction = stop_to_turn_back(&mut durations, &moves, direction, &law);
+        direction = stop_to_turn_back(&mut durations, moves, direction, law);
     }
     if limits.polar {
-        keep_accelerations(&mut durations, &moves, before, &law);
+        keep_accelerations(&mut durations, moves, before, law);
     }
     let last = match (moves.last(), durations.last()) {
         (Some(axes), Some(&duration)) => {
-            let speeds = axes.map(|distance| distance / duration);
+            let mut speeds = [0.0; MOST_AXES];
+            for (speed, distance) in speeds.iter_mut().zip(axes) {
+                *speed = distance / duration;
+            }
             Pace { speeds, duration, direction }
         }
         _ => before,
@@ -250,13 +305,14 @@ pub(crate) fn gentle_durations(
 }
 
 /// The least duration in which no axis exceeds its speed.
-fn at_speed(leg: &Leg, axes: &[f64; AXES], limits: &Limits) -> f64 {
+fn at_speed<const N: usize>(leg: &Leg, axes: &[f64; N], limits: &Limits) -> f64 {
     let fed = leg.filament.abs();
     let distance = if leg.path > 0.0 { leg.path } else { fed };
     let of_axis = |k: usize| axes[k].abs() / limits.axes[k].speed;
     let mut duration = (distance / leg.speed).max(fed / limits.extruder_speed).max(of_axis(LIFT));
     if limits.polar {
         duration = duration.max(of_axis(RAIL)).max(of_axis(BED));
+        duration = (AXES..N).map(of_axis).fold(duration, f64::max);
     }
     duration.max(limits.least_duration)
 }
@@ -264,9 +320,9 @@ fn at_speed(leg: &Leg, axes: &[f64; AXES], limits: &Limits) -> f64 {
 /// Makes the moves on both sides of a reversal of the bed slow enough to end and to begin at rest, and
 /// returns the direction in the end. Between them the drive takes up its play in a move of its own,
 /// in which nothing else moves.
-fn stop_to_turn_back(
+fn stop_to_turn_back<const N: usize>(
     durations: &mut [f64],
-    moves: &[[f64; AXES]],
+    moves: &[[f64; N]],
     before: f64,
     law: &Law<'_>,
 ) -> f64 {
@@ -285,12 +341,17 @@ fn stop_to_turn_back(
 }
 
 /// The least duration of a move that begins or ends at rest.
-fn from_rest(leg: usize, axes: &[f64; AXES], law: &Law<'_>) -> f64 {
+fn from_rest<const N: usize>(leg: usize, axes: &[f64; N], law: &Law<'_>) -> f64 {
     let needed = |k: usize| slowed(axes[k], 0.0, 0.0, law.of(k, leg));
-    (0..AXES).map(needed).fold(0.0, f64::max)
+    (0..N).map(needed).fold(0.0, f64::max)
 }
 
-fn keep_accelerations(durations: &mut [f64], moves: &[[f64; AXES]], before: Pace, law: &Law<'_>) {
+fn keep_accelerations<const N: usize>(
+    durations: &mut [f64],
+    moves: &[[f64; N]],
+    before: Pace,
+    law: &Law<'_>,
+) {
     // Pairs of neighbours of which one changed since they were found to agree; most never change.
     let mut open = vec![true; durations.len().saturating_sub(1)];
     for _ in 0..MOST_PASSES {
@@ -316,11 +377,11 @@ fn keep_accelerations(durations: &mut [f64], moves: &[[f64; AXES]], before: Pace
 }
 
 /// Makes moves `i` and `i + 1` agree where need be; returns whether anything changed.
-fn look_again(
+fn look_again<const N: usize>(
     i: usize,
     open: &mut [bool],
     durations: &mut [f64],
-    moves: &[[f64; AXES]],
+    moves: &[[f64; N]],
     law: &Law<'_>,
 ) -> bool {
     if !open[i] {
@@ -336,7 +397,12 @@ fn look_again(
 }
 
 /// Makes the first move agree with what ran before it, which can no longer change.
-fn join_on(before: Pace, durations: &mut [f64], moves: &[[f64; AXES]], law: &Law<'_>) -> bool {
+fn join_on<const N: usize>(
+    before: Pace,
+    durations: &mut [f64],
+    moves: &[[f64; N]],
+    law: &Law<'_>,
+) -> bool {
     let (Some(duration), Some(axes)) = (durations.first_mut(), moves.first()) else {
         return false;
     };
@@ -363,7 +429,7 @@ fn join_on(before: Pace, durations: &mut [f64], moves: &[[f64; AXES]], law: &Law
 
 /// Makes the last move slow enough to be followed by anything: what comes next, often a retraction
 /// that should be fast, can then keep its speed.
-fn come_to_rest(durations: &mut [f64], moves: &[[f64; AXES]], law: &Law<'_>) -> bool {
+fn come_to_rest<const N: usize>(durations: &mut [f64], moves: &[[f64; N]], law: &Law<'_>) -> bool {
     let last = durations.len().saturating_sub(1);
     let (Some(duration), Some(axes)) = (durations.last_mut(), moves.last()) else {
         return false;
@@ -375,7 +441,12 @@ fn come_to_rest(durations: &mut [f64], moves: &[[f64; AXES]], law: &Law<'_>) -> 
 }
 
 /// Makes moves `i` and `i + 1` agree; returns whether anything changed.
-fn agree(i: usize, durations: &mut [f64], moves: &[[f64; AXES]], law: &Law<'_>) -> bool {
+fn agree<const N: usize>(
+    i: usize,
+    durations: &mut [f64],
+    moves: &[[f64; N]],
+    law: &Law<'_>,
+) -> bool {
     let mut changed = false;
     let (here, next) = (moves[i], moves[i + 1]);
     for (k, (&here, next)) in here.iter().zip(next).enumerate() {

@@ -59,6 +59,7 @@ fn printer(alignment: Alignment, at: Point3<f64>) -> Printer {
         alignment,
         bed_map: machine::height_map::HeightMap::default(),
         most_turn: f64::INFINITY,
+        head: None,
     }
 }
 

@@ -146,8 +146,19 @@ impl Calibration {
     ///
     /// # Errors
     ///
-    /// `ConfigRange` for probes that are no map of a bed.
+    /// `ConfigRange` for probes that are no map of a bed, `ConfigConflict` for play of a bed under a head
+    /// that turns the nozzle.
     pub fn apply(&self, printer: &mut Printer, fade: f64) -> Result<(), Failure> {
+        if printer.head.is_some() && self.bed.backlash_deg != 0.0 {
+            return Err(Failure::new(
+                "ConfigConflict",
+                format!(
+                    "bed.backlash_deg = {}: play of the bed is not taken up under a head that turns \
+                     the nozzle",
+                    self.bed.backlash_deg
+                ),
+            ));
+        }
         let shift = self.plate.shift_mm.unwrap_or_default();
         let shift = PlateShift { by: Vector2::from(shift) };
         printer.alignment = Alignment {

@@ -3,6 +3,7 @@
 use std::io::{BufRead, ErrorKind};
 
 use mesh::mesh::Mesh;
+use plan::tilt::CHORD_SHARE;
 use twin::finding::{Finding, Severity};
 use twin::segment::Segment;
 use twin::verify::{Setup, Verdict, Verifier};
@@ -27,12 +28,15 @@ pub fn check(
     thorough: bool,
     mut each: impl FnMut(&Segment),
 ) -> Result<Verdict, Failure> {
+    let chord = job.plan.resample.chord;
+    // A head that turns the nozzle leaves the way by another half of it.
+    let chord = if job.printer.head.is_some() { chord * (1.0 + CHORD_SHARE) } else { chord };
     let mut verifier = Verifier::new(Setup {
         printer: &job.printer,
         dialect: job.dialect,
         filament_area: job.plan.filament.area,
         multiplier: job.plan.filament.multiplier,
-        coarse: (job.plan.resample.chord + job.paths.tolerance - USUAL_TOLERANCE).max(0.0),
+        coarse: (chord + job.paths.tolerance - USUAL_TOLERANCE).max(0.0),
         volume_per_second: job.plan.filament.volume_per_second,
         mesh: part,
         moved: job.paths.compensation.greatest(),

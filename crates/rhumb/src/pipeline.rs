@@ -375,6 +375,7 @@ fn layers(
                     write(text, &[surface_remark(stage, k)])?;
                 }
                 filled.paths.index = printed.levels.len();
+                planner.follow(stage.form(k));
                 printed.count(&filled, &stage.levels[k]);
                 let normal = |p: &Point3<f64>| stage.normal(k, p);
                 let steps = planner.layer_on(&filled.paths, normal).map_err(|error| {
@@ -547,6 +548,16 @@ impl Printed {
                 ),
             );
         }
+        if self.totals.residual > WORTH_TELLING_RAD {
+            warn(
+                "TiltResidual",
+                format!(
+                    "the nozzle points up to {:.1}° beside where it should: one tilt axis follows \
+                     directions in the plane of the rail only",
+                    self.totals.residual.to_degrees()
+                ),
+            );
+        }
         if self.adhesion_out_of_reach > 0 {
             warn(
                 "AdhesionLeftOut",
@@ -563,6 +574,9 @@ impl Printed {
 /// Lost places smaller than this are the sharp corners of every part, mm²: a quarter of a bead's
 /// cross-section seen from above.
 const WORTH_TELLING_MM2: f64 = 0.04;
+
+/// Directions missed by less than this are not seen, radians: one degree.
+const WORTH_TELLING_RAD: f64 = std::f64::consts::PI / 180.0;
 
 /// Returns the part as it was sliced.
 #[must_use]

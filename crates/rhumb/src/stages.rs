@@ -20,11 +20,12 @@ use mesh::flats::Facing;
 use mesh::mesh::Mesh;
 use mesh::topology::Solid;
 use nalgebra::{Point3, Vector3};
+use plan::tilt::{Field, Tilt, TiltParams};
 use slicer::clearance::{LayerOrder, Uphill, steepest_slope};
-use slicer::level::Level;
+use slicer::level::{Level, Snap};
 use slicer::lift::LEAST_WEDGE_SHARE;
 use slicer::stacking::{Side, Stair};
-use slicer::surface::{Caps, Cone, Extent, LayerSurface, Plane, Spheres, SurfaceError};
+use slicer::surface::{Caps, Cone, Extent, Form, LayerSurface, Plane, Spheres, SurfaceError};
 
 use crate::blend;
 use crate::failure::Failure;
@@ -129,6 +130,14 @@ impl Stage {
             return 0.0;
         };
         self.surface.height(last.upper, radius).max(last.upper)
+    }
+
+    /// The form of layer `k`.
+    pub(crate) fn form(&self, k: usize) -> Form {
+        match &self.morph {
+            Some(sides) => sides[k + 1].cone.form(),
+            None => self.surface.form(),
+        }
     }
 
     /// What layer `k` is called in the program.
@@ -242,7 +251,7 @@ const LEAST_CURVED: usize = 2;
 
 /// How deep the nozzle may press into what is laid, mm: a quarter of a usual layer, which a soft
 /// bead gives way by.
-const GOUGE_MM: f64 = 0.05;
+pub(crate) const GOUGE_MM: f64 = 0.05;
 
 /// Refuses layers too steep for the nozzle, or lowers a cone where the user asked for that.
 fn within_clearance(solid: &Solid, job: &Job) -> Result<LayerKind, Failure> {
@@ -254,10 +263,22 @@ fn within_clearance(solid: &Solid, job: &Job) -> Result<LayerKind, Failure> {
     };
     let most = job.nozzle.steepest(&uphill);
     if let (LayerKind::Conical(angle), true) = (job.layers, job.lower_cone) {
+        let most = most + steepest_lean(solid, angle, job);
         return Ok(LayerKind::Conical(most.min(angle.abs()).copysign(angle)));
     }
     let surface = job.layers.surface().map_err(|error| unfit(&error))?;
-    let slope = steepest_slope(solid, &*surface);
+    let slope = match Field::of(&job.printer, job.plan.tilt) {
+        // Seen from the nozzle, which leans.
+        Some(field) => {
+            let form = surface.form();
+            let floor =
+                base(job).levels.get(job.base_layers.wrapping_sub(1)).map_or(0.0, |l| l.upper);
+            let places =
+                solid.mesh().vertices.iter().map(|p| Point3::new(p.x, p.y, p.z.max(floor)));
+            places.map(|p| field.steepness(&form, &p)).fold(0.0, f64::max)
+        }
+        None => steepest_slope(solid, &*surface),
+    };
     if slope <= most {
         return Ok(job.layers);
     }
@@ -278,6 +299,22 @@ fn within_clearance(solid: &Solid, job: &Job) -> Result<LayerKind, Failure> {
         LayerKind::Spherical(_) => "lower the centre with --sphere-centre".into(),
         LayerKind::Caps(_) | LayerKind::Planar => "use a larger --cap-radius".into(),
     }))
+}
+
+/// How far the nozzle can lean everywhere in a part in layers that slope as a cone of this angle does,
+/// radians.
+fn steepest_lean(solid: &Solid, angle: f64, job: &Job) -> f64 {
+    let Some(field) = Field::of(&job.printer, TiltParams { tilt: Tilt::Normal, ..job.plan.tilt })
+    else {
+        return 0.0;
+    };
+    let Ok(cone) = Cone::new(angle) else { return 0.0 };
+    if job.plan.tilt.tilt == Tilt::None {
+        return 0.0;
+    }
+    let form = cone.form();
+    let leans = solid.mesh().vertices.iter().map(|p| field.lean(&form, p).abs());
+    leans.fold(angle.abs(), f64::min)
 }
 
 pub(crate) fn unfit(error: &SurfaceError) -> Failure {
@@ -337,6 +374,28 @@ fn least_of_bowls(part: &Mesh, surface: &dyn LayerSurface, floor: f64) -> f64 {
     if least.is_finite() { least } else { surface.level(&Point3::new(0.0, 0.0, floor)) }
 }
 
+/// A last layer thinner than this share of one is rounding.
+const WHOLE_LAYER: f64 = 1e-6;
+
+/// How far from a level the corners of a facet may be that lies on it, mm: what files with single
+/// precision make of a sphere.
+const ON_LEVEL_MM: f64 = 1e-3;
+
+/// Faces smaller than this are no reason to make layers thinner, mm².
+const LEAST_FACE_MM2: f64 = 10.0;
+
+/// The area of the facets whose corners all lie on a level of curved layers, mm².
+fn area_on_level(part: &Mesh, surface: &dyn LayerSurface, level: f64) -> f64 {
+    if surface.form().is_flat() {
+        return 0.0;
+    }
+    let corners = part.triangles.iter().map(|t| t.map(|v| part.vertices[v as usize]));
+    corners
+        .filter(|corners| corners.iter().all(|p| (surface.level(p) - level).abs() <= ON_LEVEL_MM))
+        .map(|[a, b, c]| (b - a).cross(&(c - a)).norm() / 2.0)
+        .sum()
+}
+
 fn curved(
     part: &Mesh,
     surface: Box<dyn LayerSurface>,
@@ -358,8 +417,12 @@ fn curved(
     };
     let greatest = part.vertices.iter().map(|p| surface.level(p)).fold(level(0.0, top), f64::max);
     let step = surface.level_step(job.schedule.layer_height);
-    let count = ((greatest - least) / step).ceil().max(1.0);
+    let count = ((greatest - least) / step - WHOLE_LAYER).ceil().max(1.0);
     levels::check_count(count)?;
+    // A face that is a layer itself, such as that of a lens, is met by the last one.
+    let ends_on_face = job.schedule.snap != Snap::Off
+        && area_on_level(part, &*surface, greatest) >= job.least_flat_mm2.max(LEAST_FACE_MM2);
+    let step = if ends_on_face { (greatest - least) / count } else { step };
     let skins = &job.paths.skins;
     let below = skins.bottom_layers.max(1);
     let printed = below..below + count as usize;

@@ -29,6 +29,7 @@ pub mod motor;
 pub mod nearest;
 pub mod picture;
 mod pile;
+pub mod posed;
 pub mod ramps;
 pub mod replay;
 pub mod rounding;

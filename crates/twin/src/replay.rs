@@ -20,13 +20,14 @@ use machine::gcode::dialect::{Dialect, Quantity, Space};
 use machine::gcode::speed_word::{SpeedWord, Way};
 use machine::gcode::{Command, Line, SyntaxError, parse_line};
 use machine::height_map::HeightMap;
-use machine::kinematics::Alignment;
+use machine::kinematics::{Alignment, Branch};
 use machine::profile::Printer;
 use machine::program::{BedTurn, Feed, Joints, Role};
 use nalgebra::Point3;
 
 use crate::curve::Curve;
 use crate::family::Family;
+use crate::posed::{PosedMove, PosedReplay};
 use crate::segment::Segment;
 
 /// What a line makes happen.
@@ -100,6 +101,7 @@ pub struct Replay {
     bed: LooseBed,
     home: Joints,
     dialect: Dialect,
+    posed: Option<PosedReplay>,
     line: usize,
     stand: Stand,
     /// The number of the last `F`; 0 before the first.
@@ -120,14 +122,20 @@ impl Replay {
     /// Returns a replay that stands at the printer's home, before the first line.
     #[must_use]
     pub fn new(printer: &Printer, dialect: Dialect) -> Self {
+        let posed = PosedReplay::new(printer, &dialect);
+        let mut stand = Stand::at_home(&printer.home, &dialect, &printer.alignment);
+        if posed.as_ref().is_some_and(|posed| !posed.turns_bed()) {
+            stand.joints = None;
+        }
         Self {
             alignment: printer.alignment,
+            posed,
             bed_map: printer.bed_map.clone(),
             bed: LooseBed::new(printer.alignment.bed.backlash, printer.home.turn),
             home: printer.home,
             dialect: dialect.on(printer),
             line: 0,
-            stand: Stand::at_home(&printer.home, &dialect, &printer.alignment),
+            stand,
             speed_word: 0.0,
             recounted: 0.0,
             layer: None,
@@ -209,9 +217,12 @@ impl Replay {
     }
 
     /// Returns where the words bring the drives, the bed's before any play in it; `None` where words
-    /// are part coordinates.
+    /// are part coordinates, or bring a head that turns the nozzle somewhere.
     #[must_use]
     pub fn drives(&self) -> Option<Joints> {
+        if self.posed.is_some() {
+            return None;
+        }
         let Stand { joints, drive, z, .. } = self.stand;
         joints.map(|joints| Joints { s: joints.s, turn: drive, z })
     }
@@ -228,6 +239,10 @@ impl Replay {
             Numbered(b'G', 0..=3, 0) => self.motion(command).map_or(Event::Nothing, Event::Segment),
             Numbered(b'G', 28, 0) => {
                 self.stand = Stand::at_home(&self.home, &self.dialect, &self.alignment);
+                if let Some(posed) = &mut self.posed {
+                    posed.homed();
+                    self.stand.joints = self.stand.joints.filter(|_| posed.turns_bed());
+                }
                 self.recounted = 0.0;
                 Event::Rest
             }
@@ -259,6 +274,11 @@ impl Replay {
 
     fn motion(&mut self, command: &Command<'_>) -> Option<Segment> {
         self.take_speed(command);
+        if let Some(mut posed) = self.posed.take() {
+            let segment = self.posed_motion(&mut posed, command);
+            self.posed = Some(posed);
+            return segment;
+        }
         let words = self.dialect.plane.map(|word| command.word(word.letter));
         let (z, filament) = (command.word(b'Z'), command.word(b'E'));
         let from = self.stand;
@@ -268,6 +288,31 @@ impl Replay {
             self.stand = self.stand_at(plane, z.unwrap_or(from.z));
         }
         (moves || filament.is_some()).then(|| self.segment(&from, filament.unwrap_or(0.0)))
+    }
+
+    /// A move of a head that turns the nozzle.
+    fn posed_motion(&mut self, posed: &mut PosedReplay, command: &Command<'_>) -> Option<Segment> {
+        let filament = command.word(b'E');
+        let from = self.stand;
+        let moves = posed.follow(command, self.recounted);
+        if moves {
+            let mut part = posed.last().poses[1].at;
+            let over_bed = self.alignment.over_bed(&part.xy());
+            part.z = self.bed_map.part_z(&over_bed, part.z);
+            let near = from.joints.map_or(self.home.turn, |joints| joints.turn);
+            let upright = self.alignment.joints_from_part(&part, Branch::Near, near).ok();
+            let joints = upright.filter(|_| posed.turns_bed());
+            self.stand = Stand { z: part.z, drive: posed.turn(), joints, part, ..from };
+        }
+        let swing = if moves { posed.swing() } else { 0.0 };
+        (moves || filament.is_some())
+            .then(|| self.segment_of(&from, filament.unwrap_or(0.0), swing))
+    }
+
+    /// Returns what the last move of a head that turns the nozzle did.
+    #[must_use]
+    pub fn posed(&self) -> Option<&PosedMove> {
+        self.posed.as_ref().map(PosedReplay::last)
     }
 
     fn stand_at(&mut self, plane: [f64; 2], z: f64) -> Stand {
@@ -291,6 +336,11 @@ impl Replay {
     }
 
     fn segment(&self, from: &Stand, filament: f64) -> Segment {
+        self.segment_of(from, filament, 0.0)
+    }
+
+    /// A segment in which what turns the nozzle runs `swing` mm round its tip.
+    fn segment_of(&self, from: &Stand, filament: f64, swing: f64) -> Segment {
         let to = &self.stand;
         let joints = from.joints.zip(to.joints).map(|(from, to)| [from, to]);
         let curve = match &joints {
@@ -298,8 +348,9 @@ impl Replay {
             None => Curve::between_points(&from.part, &to.part, &self.alignment),
         };
         let path = curve.length();
-        let distance = if path > 0.0 { path } else { filament.abs() };
-        let (duration, is_paced) = self.pace(from, path, filament);
+        let way = if path > 0.0 { path.max(swing) } else { 0.0 };
+        let distance = if way > 0.0 { way } else { filament.abs() };
+        let (duration, is_paced) = self.pace(from, way, filament);
         let speed = if duration > 0.0 { distance / duration } else { 0.0 };
         Segment {
             line: self.line,

@@ -7,7 +7,7 @@
 
 use machine::kinematics::{Alignment, Branch};
 use machine::program::{BedTurn, Role};
-use nalgebra::{Point3, Rotation2, Vector2, center};
+use nalgebra::{Point3, Rotation2, UnitVector3, Vector2, center};
 
 use crate::check::clearance::Clear;
 use crate::check::coverage::Hollow;
@@ -93,7 +93,13 @@ impl<'a> Watch<'a> {
         self.mark = Some(mark);
     }
 
-    pub(crate) fn segment(&mut self, segment: &Segment, findings: &mut Findings) {
+    /// The nozzle stands along `axes` at the ends of the segment.
+    pub(crate) fn segment(
+        &mut self,
+        segment: &Segment,
+        axes: &[UnitVector3<f64>; 2],
+        findings: &mut Findings,
+    ) {
         if segment.path <= 0.0 {
             return;
         }
@@ -115,7 +121,9 @@ impl<'a> Watch<'a> {
             } else {
                 self.at(segment, f64::from(k) / f64::from(count))
             };
-            self.piece([from, to], lays, segment, &mark, findings);
+            let share = f64::from(k) / f64::from(count);
+            let axis = if axes[0] == axes[1] { axes[1] } else { axes[0].slerp(&axes[1], share) };
+            self.piece([from, to], (lays, &axis), segment, &mark, findings);
             from = to;
         }
     }
@@ -145,7 +153,7 @@ impl<'a> Watch<'a> {
     fn piece(
         &mut self,
         ends: [Point3<f64>; 2],
-        lays: bool,
+        (lays, axis): (bool, &UnitVector3<f64>),
         segment: &Segment,
         mark: &LayerMark,
         findings: &mut Findings,
@@ -155,7 +163,7 @@ impl<'a> Watch<'a> {
         let height = mark.height.unwrap_or_default();
         let alignment = &self.alignment;
         let rail = || rail_over_part(alignment, segment, &ends[1]);
-        self.clear.tip(&ends[1], (layer, height), place, (&self.pile, rail), findings);
+        self.clear.tip((&ends[1], axis), (layer, height), place, (&self.pile, rail), findings);
         if !lays {
             return;
         }

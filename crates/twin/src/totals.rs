@@ -2,6 +2,7 @@
 
 use machine::program::Role;
 
+use crate::check::head::HeadTotals;
 use crate::check::volume::LayerVolume;
 use crate::segment::{Kind, Segment};
 use crate::thorough::Thorough;
@@ -58,6 +59,8 @@ pub struct Totals {
     pub nearest_to_axis: f64,
     /// Greatest distance of a bead from the surface of its layer, mm.
     pub surface_residual: f64,
+    /// What a head that turns the nozzle did; `None` where it stands upright.
+    pub head: Option<HeadTotals>,
     /// What only a thorough proof knows.
     pub thorough: Option<Thorough>,
 }

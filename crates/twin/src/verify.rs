@@ -23,9 +23,10 @@
 
 use machine::gcode::dialect::{Dialect, Space};
 use machine::gcode::{Command, MOST_COLUMNS};
+use machine::head::Head;
 use machine::profile::Printer;
 use mesh::mesh::Mesh;
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector3};
 
 use crate::arc::{Chords, ROUND, chords};
 use crate::check::acceleration::Acceleration;
@@ -34,6 +35,7 @@ use crate::check::continuity::Continuity;
 use crate::check::declared::Declared;
 use crate::check::deposit::{Deposit, Solid};
 use crate::check::flow::Flow;
+use crate::check::head::HeadCheck;
 use crate::check::heat::Heat;
 use crate::check::modes::Modes;
 use crate::check::reach::Reach;
@@ -119,6 +121,7 @@ pub struct Verifier<'a> {
     clearance: Clearance,
     speed: Speed,
     acceleration: Acceleration,
+    head: Option<HeadCheck>,
     continuity: Continuity,
     heat: Heat,
     surface: Surface,
@@ -159,13 +162,14 @@ impl<'a> Verifier<'a> {
             findings: Findings::default(),
             tally: Tally::default(),
             ramps: Ramps::new(printer),
-            text: Text::new(dialect),
+            text: Text::new(dialect).with_head(printer.head.as_ref()),
             declared: Declared::default(),
             modes: Modes::default(),
             reach: Reach::new(printer),
             clearance: Clearance::new(printer),
             speed: Speed::new(printer),
             acceleration: Acceleration::new(printer),
+            head: HeadCheck::new(printer).filter(|_| dialect.speaks_of_heads()),
             continuity: Continuity::default(),
             heat: Heat::new(printer),
             surface: Surface::new(printer),
@@ -347,10 +351,16 @@ impl<'a> Verifier<'a> {
         self.tally.segment(segment);
         self.ramps.segment(segment);
         self.declared.segment(segment);
-        self.reach.segment(segment, findings);
-        self.clearance.segment(segment, findings);
-        self.speed.segment(segment, &doubt, findings);
-        self.acceleration.segment(segment, &doubt, findings);
+        if self.setup.printer.head.as_ref().is_none_or(Head::turns_bed) {
+            self.clearance.segment(segment, findings);
+        }
+        if let (Some(head), Some(posed)) = (&mut self.head, self.replay.posed()) {
+            head.segment(segment, posed, &doubt, findings);
+        } else {
+            self.reach.segment(segment, findings);
+            self.speed.segment(segment, &doubt, findings);
+            self.acceleration.segment(segment, &doubt, findings);
+        }
         self.continuity.segment(segment, findings);
         self.heat.segment(segment, findings);
         self.surface.segment(segment);
@@ -360,7 +370,9 @@ impl<'a> Verifier<'a> {
             self.deposit.segment(segment);
         }
         if let Some(watch) = &mut self.watch {
-            watch.segment(segment, findings);
+            let upright = [Vector3::z_axis(); 2];
+            let axes = self.replay.posed().map_or(upright, |posed| posed.poses.map(|p| p.axis));
+            watch.segment(segment, &axes, findings);
         }
     }
 
@@ -381,12 +393,19 @@ impl<'a> Verifier<'a> {
     fn rest(&mut self) {
         self.ramps.rest();
         self.acceleration.rest(&mut self.findings);
+        let place = Place::line(self.replay.lines(), self.replay.layer());
+        if let Some(head) = &mut self.head {
+            head.rest(place, &mut self.findings);
+        }
     }
 
     fn layer(&mut self, mark: LayerMark) {
         self.end_layer();
         self.continuity.layer(mark, &mut self.findings);
         self.surface.layer(mark);
+        if let Some(head) = &mut self.head {
+            head.layer(mark.family.unwrap_or_default());
+        }
         self.declared.layer();
         self.flow.layer(mark);
         if let Some(watch) = &mut self.watch {
@@ -440,6 +459,7 @@ impl<'a> Verifier<'a> {
             deviation: self.continuity.worst_deviation(),
             nearest_to_axis,
             surface_residual: self.surface.worst(),
+            head: self.head.as_ref().map(HeadCheck::totals),
             thorough: None,
         }
     }

@@ -297,7 +297,7 @@ impl Dialect {
 
     /// Decimal places of lengths at this distance from the axis: near it a thousandth of a
     /// millimetre is a coarse angle.
-    fn length_decimals(&self, from_axis: f64) -> usize {
+    pub(super) fn length_decimals(&self, from_axis: f64) -> usize {
         if from_axis < NEAR_AXIS_MM { NEAR_AXIS_DECIMALS } else { MM_DECIMALS }
     }
 }

@@ -11,9 +11,10 @@ use super::correction::Correction;
 use super::dialect::{DEGREE_DECIMALS, Dialect, MM_DECIMALS, NEAR_AXIS_DECIMALS, Quantity};
 use super::label::Labels;
 use super::number::{decimal, push_quantum, quantum, value};
+use super::posed::{Drive, MOST_WORDS, PosedWord};
 use super::speed_word::Way;
 use crate::profile::Printer;
-use crate::program::{Arc, BedTurn, Joints, Layer, Move, Role, Step};
+use crate::program::{Arc, BedTurn, Joints, Layer, Move, Posed, Role, Step};
 
 /// Longest line, in characters. Marlin's command buffer holds 96.
 pub const MOST_COLUMNS: usize = 90;
@@ -38,6 +39,10 @@ pub struct Emitter<W> {
     dialect: Dialect,
     line: Vec<u8>,
     correction: Option<Correction>,
+    /// The words of a head that turns the nozzle, and what each was told last, in units of the finest
+    /// last place.
+    posed: Vec<PosedWord>,
+    told: [Option<i64>; MOST_WORDS],
     /// The last plane words and z written, in units of the finest last place.
     position: Option<[i64; 3]>,
     /// Where the bed was told to turn last.
@@ -67,6 +72,8 @@ impl<W: Write> Emitter<W> {
             dialect,
             line: Vec::with_capacity(MOST_COLUMNS),
             correction: None,
+            posed: Vec::new(),
+            told: [None; MOST_WORDS],
             position: None,
             turn: None,
             recounted: 0.0,
@@ -85,7 +92,12 @@ impl<W: Write> Emitter<W> {
     /// corrected for.
     pub fn for_printer(out: W, dialect: Dialect, printer: &Printer) -> Self {
         let dialect = dialect.on(printer);
-        Self { correction: Correction::of(printer, dialect), ..Self::new(out, dialect) }
+        let head = printer.head.as_ref().filter(|_| dialect.speaks_of_heads());
+        let posed = head.map(|head| dialect.posed_words(head)).unwrap_or_default();
+        // Heads are planned with the bed as it was probed.
+        let correction =
+            if printer.head.is_none() { Correction::of(printer, dialect) } else { None };
+        Self { correction, posed, ..Self::new(out, dialect) }
     }
 
     /// Writes one step.
@@ -97,6 +109,8 @@ impl<W: Write> Emitter<W> {
         match step {
             Step::Move(motion) => self.planned(motion),
             Step::Arc(arc) => self.motion(&arc.motion, Some(arc)),
+            Step::Posed(posed) if self.posed.is_empty() => self.motion(&posed.motion, None),
+            Step::Posed(posed) => self.stance(posed),
             Step::Layer(layer) => self.layer(layer),
             Step::Bead(role, width) => self.bead(*role, *width),
             Step::Fan(share) => self.fan(*share),
@@ -176,6 +190,7 @@ impl<W: Write> Emitter<W> {
         if line.trim_start().starts_with("G28") {
             // Where the machine stands now is not where it was told last.
             (self.position, self.turn) = (None, None);
+            self.told = [None; MOST_WORDS];
             self.recounted = 0.0;
         }
         self.text(line)
@@ -249,6 +264,63 @@ impl<W: Write> Emitter<W> {
     fn last_point(&self) -> Option<[f64; 2]> {
         let last = self.position.filter(|last| last[0] != i64::MIN)?;
         Some([0, 1].map(|k| value(last[k], NEAR_AXIS_DECIMALS)))
+    }
+
+    /// A move of a head that turns the nozzle: the words that change, carriage and bed together.
+    fn stance(&mut self, posed: &Posed) -> io::Result<()> {
+        let motion = &posed.motion;
+        let wanted = motion.filament + self.filament_owed;
+        let filament = quantum(wanted, FILAMENT_DECIMALS);
+        self.filament_owed = wanted - value(filament, FILAMENT_DECIMALS);
+        let mut told = self.told;
+        for (k, word) in self.posed.iter().enumerate() {
+            let decimals = self.posed_decimals(word.drive, posed);
+            let turned = if word.drive == Drive::Bed { self.recounted } else { 0.0 };
+            let number = word.drive.number(&posed.stance) - turned * DEGREES_IN_A_TURN;
+            let finest = 10_i64.pow((NEAR_AXIS_DECIMALS - decimals) as u32);
+            told[k] = Some(quantum(number, decimals) * finest);
+        }
+        // A move without path keeps the drives: the words are only the rounding of where they are.
+        let moved = |k: usize| motion.path > 0.0 && told[k] != self.told[k];
+        let in_plane = |k: usize| matches!(self.posed[k].drive, Drive::Carriage | Drive::Bed);
+        let plane_moved = (0..self.posed.len()).any(|k| in_plane(k) && moved(k));
+        let written: Vec<usize> = (0..self.posed.len())
+            .filter(|&k| if in_plane(k) { plane_moved } else { moved(k) })
+            .collect();
+        if written.is_empty() && filament == 0 {
+            return Ok(());
+        }
+        if self.dialect.speed.is_of_one_move() && !self.inverse_time {
+            self.inverse_time = true;
+            self.text("G93")?;
+        }
+        self.line.extend_from_slice(b"G1");
+        for &k in &written {
+            let decimals = self.posed_decimals(self.posed[k].drive, posed);
+            let finest = 10_i64.pow((NEAR_AXIS_DECIMALS - decimals) as u32);
+            self.line.extend_from_slice(&[b' ', self.posed[k].letter]);
+            push_quantum(&mut self.line, told[k].unwrap_or_default() / finest, decimals);
+            self.told[k] = told[k];
+        }
+        if filament != 0 {
+            self.line.extend_from_slice(b" E");
+            push_quantum(&mut self.line, filament, FILAMENT_DECIMALS);
+        }
+        self.speed(&Move { path: posed.way(), ..*motion }, [0; 3], true);
+        if !written.is_empty() {
+            self.turn = Some(posed.stance.base.turn);
+        }
+        if self.leaves && written.iter().any(|&k| self.posed[k].drive == Drive::Lift) {
+            self.line.extend_from_slice(b" ;E");
+        }
+        self.end_line()
+    }
+
+    fn posed_decimals(&self, drive: Drive, posed: &Posed) -> usize {
+        match drive {
+            Drive::Carriage => self.dialect.length_decimals(posed.stance.base.s.abs()),
+            drive => drive.decimals(),
+        }
     }
 
     fn plane_words(&self, to: &Joints, motion: &Move) -> [f64; 2] {
@@ -329,6 +401,7 @@ impl<W: Write> Emitter<W> {
             return Ok(());
         }
         self.recounted = (degrees / DEGREES_IN_A_TURN).floor();
+        self.told = [None; MOST_WORDS];
         let left = quantum(degrees - self.recounted * DEGREES_IN_A_TURN, DEGREE_DECIMALS);
         self.line.extend_from_slice(b"G92");
         for (k, word) in self.dialect.plane.iter().enumerate() {

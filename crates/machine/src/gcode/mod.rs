@@ -7,6 +7,7 @@ pub mod label;
 pub mod marlin;
 mod number;
 mod parse;
+pub mod posed;
 pub mod speed_word;
 
 pub use dialect::Dialect;

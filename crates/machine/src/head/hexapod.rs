@@ -71,6 +71,8 @@ pub struct JointLimits {
     pub apart: f64,
     /// Greatest condition number of the Jacobian, its turns scaled by the platform's radius.
     pub condition: f64,
+    /// How far the nozzle is ever tilted, radians.
+    pub tilt: f64,
 }
 
 /// Where a platform stands in the frame of the base.
@@ -470,7 +472,7 @@ mod tests {
 
     fn hexapod(layout: &Layout) -> Hexapod {
         let home = Vector3::new(0.0, 0.0, layout.height_at_45());
-        let joints = JointLimits { cone: 1.0, home, apart: 5.0, condition: 20.0 };
+        let joints = JointLimits { cone: 1.0, home, apart: 5.0, condition: 20.0, tilt: 0.7 };
         Hexapod::new(layout.joints(), 45.0, LEG, joints)
     }
 

@@ -143,6 +143,14 @@ impl Tilting {
     }
 }
 
+/// Returns by how much the pivot is farther from the tip than it is taken to be, mm: with the tip told to
+/// stay at a fixed point at `tilt` and at `-tilt` (radians), it is found `apart` farther inwards at the
+/// former.
+#[must_use]
+pub fn pivot_error(apart: f64, tilt: f64) -> f64 {
+    apart / (2.0 * tilt.sin())
+}
+
 fn head(tilts: [f64; 2]) -> [f64; HEAD_AXES] {
     let mut all = [0.0; HEAD_AXES];
     all[..2].copy_from_slice(&tilts);
@@ -255,6 +263,9 @@ mod tests {
         let axis = UnitVector3::new_normalize(Vector3::new(0.5, 0.0, 0.75_f64.sqrt()));
         let told = taken.stance(&Pose { at, axis }, BedTurn::default(), &ideal).unwrap().stance;
         let off = real.pose(&told, &Pose::upright(at), &ideal).unwrap().at - at;
+        // Measured at both tilts, that is how much the length is off.
+        let (inwards, tilt) = (-2.0 * off.x, std::f64::consts::FRAC_PI_6);
+        assert!((pivot_error(inwards, tilt) - 0.1).abs() < 1e-12);
         assert!((off.x + 0.05).abs() < 1e-12, "{off}");
         assert!((off.z - 0.1 * (1.0 - 0.75_f64.sqrt())).abs() < 1e-12, "{off}");
     }

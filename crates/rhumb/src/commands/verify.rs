@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use machine::gcode::dialect::Space;
+use twin::check::head::HeadTotals;
 use twin::form::FormError;
 use twin::motor::lag::{Lag, Worst};
 use twin::thorough::Thorough;
@@ -48,6 +49,7 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
                 "places": form.places,
             })),
             "load_angle": lag.as_ref().map(load_angle),
+            "head": verdict.totals.head.as_ref().map(head),
             "support": verdict.totals.thorough.as_ref().map(support),
         }))?;
     } else {
@@ -74,6 +76,9 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
             totals.rail_speed,
             totals.surface_residual * 1e3
         );
+        if let Some(head) = &totals.head {
+            let _ = writeln!(out, "{}", tilted(head));
+        }
         if let Some(thorough) = &totals.thorough {
             let _ = writeln!(out, "{}", laid(thorough));
         }
@@ -91,6 +96,28 @@ pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
         say(&out)?;
     }
     Ok(if verdict.findings.is_empty() { DONE } else { LOOK })
+}
+
+/// What a head that turns the nozzle did, for people.
+fn tilted(head: &HeadTotals) -> String {
+    format!(
+        "nozzle tilted by {:.1}° at most, {:.1}° off the layers' normal, its tip {:.1} µm off its way; \
+         drives at {:.0} % of their speeds",
+        head.tilt.to_degrees(),
+        head.off_normal.to_degrees(),
+        head.off_path * 1e3,
+        head.speed_share * 100.0
+    )
+}
+
+/// The same for programs.
+fn head(head: &HeadTotals) -> serde_json::Value {
+    serde_json::json!({
+        "tilt_deg": head.tilt.to_degrees(),
+        "off_normal_deg": head.off_normal.to_degrees(),
+        "off_path_mm": head.off_path,
+        "speed_share": head.speed_share,
+    })
 }
 
 /// The error of the part's form on a machine that misses the ideal one as the file says.

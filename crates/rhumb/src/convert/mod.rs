@@ -98,6 +98,13 @@ pub fn convert(
     interrupt: &Interrupt,
 ) -> Result<Converted, Failure> {
     let job = request.job;
+    if job.printer.head.is_some() {
+        return Err(Failure::new(
+            "ConfigConflict",
+            "programs of other slicers are for upright nozzles, this printer's head turns its own",
+        )
+        .hint("--set head=fixed, where the carriage can move the nozzle without its tilts"));
+    }
     let chord = job.plan.resample.chord;
     let mut batches = Batches::new(source, request, chord * ARC_SHARE);
     let mut planning = Planning::new(request, chord * (1.0 - ARC_SHARE));

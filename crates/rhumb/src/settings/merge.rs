@@ -75,6 +75,26 @@ pub const BUILT_IN: &[BuiltIn] = &[
         text: include_str!("../../profiles/core-r-theta.toml"),
     },
     BuiltIn {
+        name: "tilt-core-r-theta",
+        section: Section::Printer,
+        text: include_str!("../../profiles/tilt-core-r-theta.toml"),
+    },
+    BuiltIn {
+        name: "polar-two-axis",
+        section: Section::Printer,
+        text: include_str!("../../profiles/polar-two-axis.toml"),
+    },
+    BuiltIn {
+        name: "hexapod",
+        section: Section::Printer,
+        text: include_str!("../../profiles/hexapod.toml"),
+    },
+    BuiltIn {
+        name: "hexapod-fixed",
+        section: Section::Printer,
+        text: include_str!("../../profiles/hexapod-fixed.toml"),
+    },
+    BuiltIn {
         name: "linuxcnc-rotary",
         section: Section::Printer,
         text: include_str!("../../profiles/linuxcnc-rotary.toml"),

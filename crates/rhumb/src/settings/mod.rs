@@ -8,6 +8,7 @@
 
 mod expression;
 pub mod file;
+mod head;
 pub mod key;
 pub mod merge;
 pub mod page;

@@ -19,8 +19,9 @@ use plan::resample::ResampleParams;
 use plan::route::{FilamentParams, Speeds};
 use plan::scarf::{ScarfParams, ScarfPlacement};
 use plan::seam::SeamPosition;
+use plan::tilt::TiltParams;
 use slicer::adhesion::AdhesionParams;
-use slicer::clearance::NozzleProfile;
+use slicer::clearance::{LayerOrder, NozzleProfile, Uphill};
 use slicer::compensation::CompensationParams;
 use slicer::fuzzy::FuzzyParams;
 use slicer::infill::{InfillParams, IroningParams, Pattern, SolidPattern};
@@ -33,6 +34,7 @@ use slicer::walls::WallParams;
 use twin::motor::Motor;
 use twin::motor::lag::BedDrive;
 
+use super::head;
 use super::key::{Key, Value};
 use super::merge::Settings;
 use super::template;
@@ -116,7 +118,7 @@ impl Job {
     /// `ConfigRange` or `ConfigConflict` for values that do not fit together.
     pub fn resolve(settings: &Settings) -> Result<Self, Failure> {
         let get = Lookup(settings);
-        let mut printer = printer(&get);
+        let mut printer = printer(&get)?;
         let dialect = Dialect::by_name(get.text("dialect"))
             .ok_or_else(|| conflict("there is no such dialect", get.text("dialect")))?
             .on(&printer);
@@ -139,13 +141,8 @@ impl Job {
             layers: layers(&get),
             choose_layers: get.text("layers") == "auto",
             lower_cone: get.switch("cone_angle_max"),
-            nozzle: NozzleProfile {
-                flat_radius: get.number("nozzle_flat_radius_mm"),
-                half_angle: get.number("nozzle_half_angle_deg").to_radians(),
-                block_height: get.number("nozzle_block_height_mm"),
-                block_radius: get.number("nozzle_block_radius_mm"),
-            },
-            base_layers: get.count("base_layers"),
+            nozzle: nozzle(&get),
+            base_layers: base_layers(&get),
             morph: get.text("blend") == "morph",
             planar_top: get.text("top") == "planar",
             schedule: schedule(&get)?,
@@ -189,12 +186,23 @@ fn layers(get: &Lookup<'_>) -> LayerKind {
     }
 }
 
+/// Planar layers under curved ones: so many, and all that end below where curved ones are to begin.
+fn base_layers(get: &Lookup<'_>) -> usize {
+    // Heights are sums of decimals.
+    const NOISE: f64 = 1e-6;
+    let above_first = get.number("curved_from_mm") - get.number("first_layer_height_mm");
+    let height = get.number("layer_height_mm");
+    let below =
+        if above_first > -NOISE { 1.0 + (above_first / height + NOISE).floor() } else { 0.0 };
+    get.count("base_layers").max(below as usize)
+}
+
 fn conflict(what: &str, value: &str) -> Failure {
     Failure::new("ConfigConflict", format!("{what}: {value:?}"))
 }
 
-fn printer(get: &Lookup<'_>) -> Printer {
-    Printer {
+fn printer(get: &Lookup<'_>) -> Result<Printer, Failure> {
+    Ok(Printer {
         name: get.text("printer_model").to_owned(),
         rail: Axis {
             min: get.number("rail_min_mm"),
@@ -203,7 +211,7 @@ fn printer(get: &Lookup<'_>) -> Printer {
             acceleration: get.number("rail_acceleration_mm_per_s2"),
         },
         lift: Axis {
-            min: 0.0,
+            min: get.number("z_min_mm"),
             max: get.number("z_max_mm"),
             speed: get.number("z_speed_mm_per_s"),
             acceleration: get.number("z_acceleration_mm_per_s2"),
@@ -241,7 +249,8 @@ fn printer(get: &Lookup<'_>) -> Printer {
         },
         bed_map: HeightMap::default(),
         most_turn: most_turn(get.number("turns_max")),
-    }
+        head: head::head(get)?,
+    })
 }
 
 fn drives(get: &Lookup<'_>) -> Result<Drives, Failure> {
@@ -273,6 +282,13 @@ fn drives(get: &Lookup<'_>) -> Result<Drives, Failure> {
 
 /// Takes from a printer what its firmware cannot use.
 fn suit(printer: &mut Printer, dialect: &Dialect) -> Result<(), Failure> {
+    if printer.head.is_some() && !dialect.speaks_of_heads() && dialect.space != Space::Part {
+        return Err(conflict(
+            "a firmware that turns part coordinates into joints itself knows of no tilt",
+            dialect.name,
+        )
+        .hint("use dialect = \"polar\" or \"rrf-direct\""));
+    }
     if dialect.space != Space::IdealPlane {
         return Ok(());
     }
@@ -589,6 +605,27 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
             full_fan_layer: get.count("full_fan_speed_layer"),
         },
         curved,
+        tilt: TiltParams { tilt: head::tilt(get), clears: clears(get) },
+    }
+}
+
+/// The steepest slope that a nozzle clears, seen from its own axis, radians.
+fn clears(get: &Lookup<'_>) -> f64 {
+    let uphill = Uphill {
+        extent: f64::INFINITY,
+        thickness: get.number("layer_height_mm"),
+        allowance: crate::stages::GOUGE_MM,
+        order: LayerOrder::LowToHigh,
+    };
+    nozzle(get).steepest(&uphill)
+}
+
+fn nozzle(get: &Lookup<'_>) -> NozzleProfile {
+    NozzleProfile {
+        flat_radius: get.number("nozzle_flat_radius_mm"),
+        half_angle: get.number("nozzle_half_angle_deg").to_radians(),
+        block_height: get.number("nozzle_block_height_mm"),
+        block_radius: get.number("nozzle_block_radius_mm"),
     }
 }
 
@@ -624,14 +661,14 @@ fn scarf(get: &Lookup<'_>) -> ScarfParams {
 
 /// Values by name. A name that is not in the table, or of another kind, is a mistake of ours that
 /// the first test of every build finds.
-struct Lookup<'a>(&'a Settings);
+pub(super) struct Lookup<'a>(&'a Settings);
 
 impl Lookup<'_> {
     fn value(&self, name: &str) -> &Value {
         self.0.get(Key::by_name(name).expect("names are in the table")).0
     }
 
-    fn number(&self, name: &str) -> f64 {
+    pub(super) fn number(&self, name: &str) -> f64 {
         match self.value(name) {
             Value::Number(number) => *number,
             other => unreachable!("{name} is a number, not {other}"),
@@ -652,7 +689,7 @@ impl Lookup<'_> {
         }
     }
 
-    fn text(&self, name: &str) -> &str {
+    pub(super) fn text(&self, name: &str) -> &str {
         match self.value(name) {
             Value::Text(text) => text,
             other => unreachable!("{name} is a text, not {other}"),

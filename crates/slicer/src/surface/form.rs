@@ -92,6 +92,20 @@ impl Form {
         self.kind == Kind::Plane
     }
 
+    /// Returns by how much the layer through a point of the part slopes down outwards, radians; negative
+    /// in bowls. On the axis it is that of the places beside it.
+    #[must_use]
+    pub fn slope(&self, p: &Point3<f64>) -> f64 {
+        let r = length(p.x, p.y);
+        match self.kind {
+            Kind::Plane => 0.0,
+            Kind::Cone { slope } if self.is_mirrored => -slope.atan(),
+            Kind::Cone { slope } => slope.atan(),
+            Kind::Spheres { centre_z } => r.atan2(p.z - centre_z),
+            Kind::Caps { radius } => (r / radius).min(1.0).asin(),
+        }
+    }
+
     /// Returns whether convex coordinates have z negated, and F is the negated level.
     #[must_use]
     pub fn is_mirrored(&self) -> bool {
@@ -300,6 +314,26 @@ fn length(x: f64, y: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slopes_are_those_of_the_normals() {
+        use crate::surface::{Caps, Cone, LayerSurface, Plane, Spheres};
+        let surfaces: [Box<dyn LayerSurface>; 5] = [
+            Box::new(Plane),
+            Box::new(Cone::new(0.6).unwrap()),
+            Box::new(Cone::new(-0.4).unwrap()),
+            Box::new(Spheres::new(-12.0).unwrap()),
+            Box::new(Caps::new(80.0).unwrap()),
+        ];
+        for surface in surfaces {
+            for (x, y, z) in [(3.0, 4.0, 2.0), (-30.0, 1.0, 9.0), (0.5, -0.2, 0.0)] {
+                let p = Point3::new(x, y, z);
+                let (normal, slope) = (surface.normal(&p), surface.form().slope(&p));
+                let out = normal.x * x / length(x, y) + normal.y * y / length(x, y);
+                assert!((out.atan2(normal.z) - slope).abs() < 1e-12, "{:?} {p}", surface.form());
+            }
+        }
+    }
 
     fn forms() -> [Form; 5] {
         [Form::cone(0.5), Form::cone(-1.0), Form::spheres(-20.0), Form::caps(60.0), Form::plane()]

@@ -36,7 +36,7 @@ pub(crate) struct Acceleration {
 
 /// One axis: its limits, how it ran last, and how far its speed ran ahead.
 #[derive(Debug, Clone, Copy)]
-struct Axis {
+pub(crate) struct Axis {
     limit: f64,
     sudden: f64,
     /// `None` where nothing is known of it.
@@ -48,14 +48,14 @@ struct Axis {
 
 /// The mean speed over one segment.
 #[derive(Debug, Clone, Copy, Default)]
-struct Run {
-    speed: f64,
+pub(crate) struct Run {
+    pub(crate) speed: f64,
     /// How far the speed may be off.
-    doubt: f64,
+    pub(crate) doubt: f64,
     /// From the middle to either end, s.
-    half: f64,
+    pub(crate) half: f64,
     /// How far that may be off, s.
-    half_doubt: f64,
+    pub(crate) half_doubt: f64,
 }
 
 /// A stretch of the program over which the speed changed one way.
@@ -69,8 +69,8 @@ struct Stretch {
 
 /// A stretch over which an axis cannot follow.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Broken {
-    acceleration: f64,
+pub(crate) struct Broken {
+    pub(crate) acceleration: f64,
     change: f64,
     time: f64,
 }
@@ -159,7 +159,8 @@ impl Acceleration {
 }
 
 impl Axis {
-    fn new(limit: f64, sudden: f64) -> Self {
+    /// Returns an axis at rest, with its limit and what its speed may change by at once.
+    pub(crate) fn new(limit: f64, sudden: f64) -> Self {
         let (last, none) = (Some(Run::default()), Stretch::default());
         Self { limit, sudden, last, faster: none, slower: none, greatest: 0.0 }
     }
@@ -170,7 +171,13 @@ impl Axis {
         Self { last: None, faster: none, slower: none, ..self }
     }
 
-    fn next(&mut self, run: Run) -> Option<Broken> {
+    /// The limit that it was given.
+    pub(crate) fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    /// Returns the stretch, ending here, over which it could not follow.
+    pub(crate) fn next(&mut self, run: Run) -> Option<Broken> {
         let last = self.last.replace(run)?;
         let time = last.half + run.half;
         if time == 0.0 {

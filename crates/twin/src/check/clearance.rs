@@ -10,13 +10,16 @@
 //!   layer slopes; that is not judged.
 //! * Cone, block and carriage may touch what was laid to [`TOUCHED`]; the cone counts from a layer above
 //!   the face, and for what the present layer laid from [`SOFT`] faces off.
+//! * A nozzle that leans is compared upright with beads that are turned about its tip the other way; the
+//!   carriage above it does not lean.
 //! * The carriage is a beam over the whole bed, along the rail as it lies over the part there.
 //!
 //! mm, part frame.
 
 use geom::lift::{Tool, lift};
+use machine::head::{Head, shortest_turn};
 use machine::profile::{NozzleShape, Printer};
-use nalgebra::{Point2, Point3, Vector2};
+use nalgebra::{Point2, Point3, UnitVector3, Vector2, Vector3};
 
 use crate::finding::{Findings, Place};
 use crate::pile::{CELL, Pile, Rise, Underside};
@@ -47,6 +50,8 @@ pub(crate) struct Clear {
     nozzle: NozzleShape,
     /// Half the length of the carriage's beam: over all of the bed from anywhere.
     half_beam: f64,
+    /// From the tip to what a head turns the nozzle about, mm.
+    pivot_length: f64,
     deepest: f64,
     found: usize,
 }
@@ -66,14 +71,20 @@ impl Clear {
     /// Returns the check for this printer.
     pub(crate) fn new(printer: &Printer) -> Self {
         let reach = printer.rail.max.max(-printer.rail.min);
-        Self { nozzle: printer.nozzle, half_beam: 2.0 * reach, deepest: 0.0, found: 0 }
+        Self {
+            nozzle: printer.nozzle,
+            half_beam: 2.0 * reach,
+            pivot_length: printer.head.as_ref().map_or(0.0, Head::pivot_length),
+            deepest: 0.0,
+            found: 0,
+        }
     }
 
-    /// The tip stands at `tip` while a layer `thickness` thick is printed; `rail` says where the rail
+    /// The tip stands at `tip`, the nozzle along `axis`, while a layer `thickness` thick is printed; `rail` says where the rail
     /// lies over the part.
     pub(crate) fn tip(
         &mut self,
-        tip: &Point3<f64>,
+        (tip, axis): (&Point3<f64>, &UnitVector3<f64>),
         (layer, thickness): (u32, f64),
         place: Place,
         (pile, rail): (&Pile, impl Fn() -> Vector2<f64>),
@@ -81,36 +92,43 @@ impl Clear {
     ) {
         // How far anything rises above the tip.
         let rises = pile.greatest() - tip.z;
-        if rises <= 0.0 || self.found >= ENOUGH {
+        let sine = axis.xy().norm();
+        let NozzleShape { flat_radius, block_height, block_radius, .. } = self.nozzle;
+        let rim = block_height * axis.z - block_radius * sine;
+        if rises <= rim.min(-flat_radius * sine) || self.found >= ENOUGH {
             return;
         }
+        let stand = &Stand { tip, axis };
         let limit = PRESSED * thickness;
         let face =
             Part { what: "the face of the nozzle", tool: self.face(), limit, ignored: Some(layer) };
-        self.judge(&face, tip, place, pile, findings);
+        self.judge(&face, stand, place, pile, findings);
         let what = "the cone of the nozzle";
         let soft = self.nozzle.height(SOFT * self.nozzle.flat_radius);
         for (from, ignored) in [(thickness, Some(layer)), (soft.max(thickness), None)] {
             if let Some(tool) = self.cone(from) {
                 let cone = Part { what, tool, limit: TOUCHED, ignored };
-                if self.judge(&cone, tip, place, pile, findings) {
+                if self.judge(&cone, stand, place, pile, findings) {
                     break;
                 }
             }
         }
-        if rises > self.nozzle.block_height {
+        if rises > rim {
             let part = Part {
                 what: "the heater block",
                 tool: self.block(),
                 limit: TOUCHED,
                 ignored: None,
             };
-            self.judge(&part, tip, place, pile, findings);
+            self.judge(&part, stand, place, pile, findings);
         }
-        if rises > self.nozzle.carriage_height {
+        // It does not lean; the pivot below it stands where the nozzle leads.
+        let swung = tip + (axis.into_inner() - Vector3::z()) * self.pivot_length;
+        if rises > self.nozzle.carriage_height + swung.z - tip.z {
             let tool = self.carriage(rail());
             let part = Part { what: "the carriage", tool, limit: TOUCHED, ignored: None };
-            self.judge(&part, tip, place, pile, findings);
+            let upright = Stand { tip: &swung, axis: &Vector3::z_axis() };
+            self.judge(&part, &upright, place, pile, findings);
         }
     }
 
@@ -142,21 +160,25 @@ impl Clear {
     fn judge(
         &mut self,
         part: &Part,
-        tip: &Point3<f64>,
+        stand: &Stand<'_>,
         place: Place,
         pile: &Pile,
         findings: &mut Findings,
     ) -> bool {
         // What is neither forbidden nor deeper than anything before need not be known.
         let least = part.limit.min(self.deepest);
-        let standing = Standing { tool: &part.tool, tip, raised: least };
+        let Stand { tip, axis } = *stand;
+        let standing = Standing { tool: &part.tool, tip, axis, raised: least };
+        let upright = leans(axis).then(|| shortest_turn(axis).inverse());
         let mut worst: Option<(f64, Rise)> = None;
         for rise in pile.rising(&standing, part.ignored) {
             let so_far = worst.map_or(least, |(depth, _)| depth);
             if least + rise.above <= so_far {
                 break;
             }
-            if let Some(depth) = lift(&part.tool, tip, &pile.bead(rise.piece), so_far) {
+            let bead = pile.bead(rise.piece);
+            let bead = upright.map_or(bead, |turn| bead.turned_about(tip, &turn));
+            if let Some(depth) = lift(&part.tool, tip, &bead, so_far) {
                 worst = Some((depth, rise));
             }
         }
@@ -187,16 +209,33 @@ impl Clear {
 /// its own, and what it rises within one.
 const PAD: f64 = CELL;
 
+/// Where the tip is, and where the nozzle points up to.
+struct Stand<'a> {
+    tip: &'a Point3<f64>,
+    axis: &'a UnitVector3<f64>,
+}
+
+/// Less than this is upright, radians: a micrometre is a thousand times as much as it moves any body.
+const UPRIGHT: f64 = 1e-9;
+
+fn leans(axis: &UnitVector3<f64>) -> bool {
+    axis.xy().norm() > UPRIGHT
+}
+
 /// A body over its place, and raised.
 struct Standing<'a> {
     tool: &'a Tool,
     tip: &'a Point3<f64>,
+    axis: &'a UnitVector3<f64>,
     raised: f64,
 }
 
 impl Underside for Standing<'_> {
     fn lowest(&self, about: &Point2<f64>, radius: f64) -> f64 {
         let from_axis = about - self.tip.xy();
+        if leans(self.axis) {
+            return self.tip.z + self.lowest_leaning(&from_axis, radius + PAD);
+        }
         let height = match self.tool {
             Tool::Frustum { radii: [low, high], heights } => {
                 let distance = from_axis.norm() - radius - PAD;
@@ -219,11 +258,62 @@ impl Underside for Standing<'_> {
     }
 
     fn square(&self) -> (Point2<f64>, f64) {
+        if leans(self.axis) {
+            return (self.tip.xy(), self.reach() + PAD);
+        }
         let half = match self.tool {
             Tool::Frustum { radii, .. } => radii[0].max(radii[1]),
             Tool::Beam { half, .. } => half[0] + half[1],
         };
         (self.tip.xy(), half + PAD)
+    }
+}
+
+impl Standing<'_> {
+    /// How far a leaning body reaches sideways.
+    fn reach(&self) -> f64 {
+        let (Tool::Frustum { heights, .. } | Tool::Beam { heights, .. }) = self.tool;
+        let wide = match self.tool {
+            Tool::Frustum { radii, .. } => radii[0].max(radii[1]),
+            Tool::Beam { half, .. } => half[0] + half[1],
+        };
+        wide + heights[1] * self.axis.xy().norm()
+    }
+
+    /// How high above the tip a leaning body is at least over a place and what is within `radius` of it.
+    ///
+    /// With `x` the way the nozzle leans and `y` across, a point of it is `t = x·sin + z·cos` up the nozzle
+    /// and `q = x·cos − z·sin` beside it; a cone has `t ≥ h + (|q| − r)/tan` and the same of `|y|`, a
+    /// cylinder `|q|, |y| ≤ r`. Each is a plane, and the body lies above all of them.
+    fn lowest_leaning(&self, from_tip: &Vector2<f64>, radius: f64) -> f64 {
+        let lean = self.axis.xy();
+        let (sin, cos) = (lean.norm(), self.axis.z);
+        let Tool::Frustum { radii: [low, high], heights: [base, top] } = *self.tool else {
+            return f64::NEG_INFINITY;
+        };
+        if from_tip.norm() > self.reach() + radius {
+            return f64::INFINITY;
+        }
+        let (x, y) = (from_tip.dot(&lean) / sin, lean.perp(from_tip) / sin);
+        // The height of a plane over x, less what it falls within the radius.
+        let plane = |at_zero: f64, slope: f64| at_zero + slope * x - slope.abs() * radius;
+        let aside = (y.abs() - radius).max(0.0);
+        let slope = (high - low) / (top - base);
+        let mut height = plane(base / cos, -sin / cos);
+        if slope > 0.0 {
+            let foot = base - low / slope;
+            height = height.max(plane((foot + aside / slope) / cos, -sin / cos));
+            let across = [cos + sin / slope, cos - sin / slope];
+            height = height.max(plane(foot / across[0], (cos / slope - sin) / across[0]));
+            if across[1] > 0.0 {
+                height = height.max(plane(foot / across[1], -(cos / slope + sin) / across[1]));
+            }
+        } else if aside > high {
+            return f64::INFINITY;
+        } else {
+            height = height.max(plane(-high / sin, cos / sin));
+        }
+        height + self.raised * cos
     }
 }
 
@@ -246,7 +336,8 @@ mod tests {
         pile.lay(piece);
         let (mut check, mut findings) = (Clear::new(&printer()), Findings::default());
         let (place, rail) = (Place::line(1, None), Vector2::from(rail));
-        check.tip(&Point3::from(tip), (4, 0.2), place, (&pile, || rail), &mut findings);
+        let stand = (&Point3::from(tip), &Vector3::z_axis());
+        check.tip(stand, (4, 0.2), place, (&pile, || rail), &mut findings);
         let messages = findings.kept().iter().map(|finding| finding.message.clone()).collect();
         (messages, check.deepest())
     }
@@ -279,6 +370,63 @@ mod tests {
     }
 
     #[test]
+    fn a_nozzle_that_leans_away_clears_what_an_upright_one_hits_and_hits_the_other_side() {
+        let wall = |y: f64, top: f64| bead([[-5.0, y, top], [5.0, y, top]], Family::Planar);
+        let found = |piece: &Piece, lean: f64| {
+            let mut pile = Pile::new(60.0);
+            pile.lay(piece);
+            let (mut check, mut findings) = (Clear::new(&printer()), Findings::default());
+            let axis = UnitVector3::new_normalize(Vector3::new(0.0, lean.sin(), lean.cos()));
+            let rail = || Vector2::x();
+            let place = Place::line(1, None);
+            let tip = Point3::new(0.0, 0.0, 5.0);
+            check.tip((&tip, &axis), (4, 0.2), place, (&pile, rail), &mut findings);
+            let told: Vec<String> = findings.kept().iter().map(|f| f.message.clone()).collect();
+            told
+        };
+        // A wall 3 mm higher than the tip, 2 mm beside it.
+        let near = wall(-2.0, 8.0);
+        assert!(found(&near, 0.0)[0].starts_with("the cone of the nozzle"));
+        assert!(found(&near, 0.6).is_empty(), "{:?}", found(&near, 0.6));
+        assert!(!found(&near, -0.3).is_empty());
+        // Leaning by 30°, the far rim of the block is 12·cos 30° − 20·sin 30° = 0.39 mm above the tip, and
+        // 23.3 mm from it.
+        let far = wall(22.0, 6.5);
+        assert!(found(&far, 0.0).is_empty());
+        let hit = found(&far, std::f64::consts::FRAC_PI_6);
+        assert!(hit.iter().any(|told| told.starts_with("the heater block")), "{hit:?}");
+    }
+
+    #[test]
+    fn leaning_bodies_lie_above_what_is_said_of_them() {
+        let clear = Clear::new(&printer());
+        let mut closest = f64::INFINITY;
+        for tool in [clear.face(), clear.cone(0.2).unwrap(), clear.block()] {
+            let Tool::Frustum { radii, heights } = tool else { panic!() };
+            for k in 0..4000_u32 {
+                let t = f64::from(k);
+                let part = |share: f64| (t * share).fract();
+                let (lean, way) = (0.02 + part(0.618), 6.3 * part(0.31));
+                let axis = Vector3::new(lean.sin() * way.cos(), lean.sin() * way.sin(), lean.cos());
+                let axis = UnitVector3::new_normalize(axis);
+                let share = if k.is_multiple_of(2) { 0.0 } else { part(0.37) };
+                let height = heights[0] + (heights[1] - heights[0]) * share;
+                let radius = radii[0] + (radii[1] - radii[0]) * share;
+                let angle = 6.3 * part(0.77);
+                let upright = Vector3::new(radius * angle.cos(), radius * angle.sin(), height);
+                let inside = shortest_turn(&axis) * upright;
+                let tip = Point3::new(3.0, -4.0, 7.0);
+                let standing = Standing { tool: &tool, tip: &tip, axis: &axis, raised: 0.0 };
+                let place = tip.xy() + inside.xy();
+                let lowest = standing.lowest(&place, 0.1);
+                assert!(lowest <= tip.z + inside.z, "{tool:?} {lean}: {lowest} {inside}");
+                closest = closest.min(tip.z + inside.z - lowest);
+            }
+        }
+        assert!(closest < 0.3, "{closest}");
+    }
+
+    #[test]
     fn only_the_carriage_lies_over_what_is_far_along_the_rail() {
         let tower = bead([[0.0, 50.0, 62.0], [0.5, 50.0, 62.0]], Family::Planar);
         let (hit, depth) = found_beside(&tower, [0.0, 0.0, 1.0], [0.0, 1.0]);
@@ -304,7 +452,8 @@ mod tests {
         let mut told_apart = 0;
         for step in 0..40 {
             let tip = Point3::new(7.0, 0.9, at(7.0)[2] + 1.0 - 0.03 * f64::from(step));
-            let standing = Standing { tool: &tool, tip: &tip, raised: TOUCHED };
+            let axis = &Vector3::z_axis();
+            let standing = Standing { tool: &tool, tip: &tip, axis, raised: TOUCHED };
             let cells = !pile.rising(&standing, None).is_empty();
             let depth = lift(&tool, &tip, &pile.bead(0), TOUCHED);
             assert!(cells || depth.is_none(), "{step}: cells do not see {depth:?}");

@@ -6,7 +6,7 @@
 //! that is not a number is always a finding.
 //!
 //! On the text: [`text`], [`modes`], [`declared`]. On the machine: [`reach`], [`axis`], [`speed`],
-//! [`acceleration`], [`heat`]. On the part: [`continuity`], [`surface`],
+//! [`acceleration`], [`mod@head`], [`heat`]. On the part: [`continuity`], [`surface`],
 //! [`flow`], [`volume`], [`deposit`]. On what lies below and around, where a full proof is asked for:
 //! [`support`], [`overlap`], [`coverage`], [`clearance`].
 
@@ -18,6 +18,7 @@ pub mod coverage;
 pub mod declared;
 pub mod deposit;
 pub mod flow;
+pub mod head;
 pub mod heat;
 pub mod modes;
 pub mod overlap;

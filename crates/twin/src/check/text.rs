@@ -10,7 +10,9 @@
 
 use machine::gcode::dialect::Dialect;
 use machine::gcode::dialect::Space;
+use machine::gcode::posed::MOST_WORDS;
 use machine::gcode::{Code, Command, MOST_COLUMNS, SyntaxError, printable};
+use machine::head::Head;
 
 use crate::finding::{Findings, Place};
 
@@ -43,6 +45,9 @@ const NAMED: [&str; 5] = [
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Text {
     dialect: Dialect,
+    /// The letters that say where a head that turns the nozzle stands, and whether two of them are those of
+    /// the plane.
+    head: Option<([u8; MOST_WORDS + 2], bool)>,
     /// Whether all but the motion comes from another program.
     is_converted: bool,
     /// Whether such a command was seen.
@@ -53,7 +58,20 @@ impl Text {
     /// Returns the check for programs in this dialect.
     #[must_use]
     pub(crate) fn new(dialect: Dialect) -> Self {
-        Self { dialect, is_converted: false, has_kept: false }
+        Self { dialect, head: None, is_converted: false, has_kept: false }
+    }
+
+    /// The same for a machine whose head turns the nozzle.
+    pub(crate) fn with_head(self, head: Option<&Head>) -> Self {
+        let head = head.filter(|_| self.dialect.speaks_of_heads()).map(|head| {
+            let mut letters = [b'E'; MOST_WORDS + 2];
+            letters[1] = b'F';
+            for (letter, word) in letters[2..].iter_mut().zip(self.dialect.posed_words(head)) {
+                *letter = word.letter;
+            }
+            (letters, head.has_carriage())
+        });
+        Self { head, ..self }
     }
 
     /// What is not motion comes from another program from here on: it is as its author wrote it, and
@@ -164,14 +182,17 @@ impl Text {
 
     fn motion(&self, command: &Command<'_>, place: Place, findings: &mut Findings) {
         let plane = self.dialect.plane.map(|word| command.word(word.letter).is_some());
-        if plane[0] != plane[1] {
+        let in_pairs = self.head.is_none_or(|(_, has_carriage)| has_carriage);
+        if plane[0] != plane[1] && in_pairs {
             let [first, second] = self.dialect.plane.map(|word| word.letter as char);
             findings.error(NAME, place, (1.0, 2.0), || {
                 format!("{first} and {second} must come together, one of them is missing")
             });
         }
         let [first, second] = self.dialect.plane.map(|word| word.letter);
-        if let Some(letter) = command.letter_besides(&[b'Z', b'E', b'F', first, second]) {
+        let usual = [b'Z', b'E', b'F', first, second];
+        let known = self.head.as_ref().map_or(&usual[..], |(letters, _)| letters);
+        if let Some(letter) = command.letter_besides(known) {
             let name = self.dialect.name;
             findings.error(NAME, place, (1.0, 0.0), || {
                 format!("the word {} means nothing in a move of dialect {name}", letter as char)
@@ -182,7 +203,7 @@ impl Text {
                 format!("the speed F is {feed} mm/min, it must be positive")
             });
         }
-        let alone = !plane[0] && !plane[1] && command.word(b'Z').is_none();
+        let alone = command.letter_besides(b"GEF").is_none();
         let filament = command.word(b'E').unwrap_or(0.0).abs();
         if alone && filament >= FILAMENT_ALONE {
             findings.error(NAME, place, (filament, FILAMENT_ALONE), || {

@@ -47,7 +47,9 @@ pub struct Step {
 
 /// The program does not say where the joints are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a program in dialect {0} does not say where the motors are")]
+#[error(
+    "a program in dialect {0} does not say where carriage, bed and lift alone bring this machine"
+)]
 pub struct NoJoints(pub &'static str);
 
 impl Stepper {

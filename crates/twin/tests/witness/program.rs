@@ -46,6 +46,7 @@ pub(crate) fn printer() -> Printer {
         alignment: Alignment::default(),
         bed_map: Default::default(),
         most_turn: f64::INFINITY,
+        head: None,
     }
 }
 

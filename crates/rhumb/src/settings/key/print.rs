@@ -39,6 +39,15 @@ pub(super) const KEYS: &[Key] = &[
         "slope of conical layers; positive when they fall outwards, negative for bowls",
     ),
     Key {
+        name: "tilt",
+        section: Print,
+        kind: Kind::Choice(&["needed", "normal", "none"]),
+        default: Default::Text("needed"),
+        program_name: "",
+        meaning: "where the head can turn the nozzle: as little as it needs to clear the layers, along \
+                  their normal, or not at all",
+    },
+    Key {
         name: "cone_angle_max",
         section: Print,
         kind: Kind::Switch,
@@ -61,6 +70,13 @@ pub(super) const KEYS: &[Key] = &[
         "radius of the sphere whose cap is lifted",
     ),
     count(Print, "base_layers", (2, 0, 1000), "planar layers under curved ones"),
+    number(
+        Print,
+        "curved_from_mm",
+        "",
+        (0.0, 0.0, 2000.0),
+        "height below which layers stay planar, where that is more than base_layers",
+    ),
     choice(
         Print,
         "blend",

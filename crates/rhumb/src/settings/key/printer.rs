@@ -3,6 +3,26 @@
 use super::{Default, Key, Kind, Section, choice, number, text};
 use Section::Printer;
 
+const HEADS: &[&str] = &["fixed", "tilt", "two-axis", "hexapod"];
+
+const LAYOUTS: &[&str] = &["6-3", "6-6", "3-3", "joints"];
+
+const TABLES: &[&str] = &["turning", "standing"];
+
+/// A fact of machines with a head that turns the nozzle, which others need not say.
+const fn of_head(name: &'static str, range: (f64, f64, f64), meaning: &'static str) -> Key {
+    number(Printer, name, "", range, meaning)
+}
+
+const fn choice_of_head(
+    name: &'static str,
+    words: &'static [&'static str],
+    meaning: &'static str,
+) -> Key {
+    let default = Default::Text(words[0]);
+    Key { name, section: Printer, kind: Kind::Choice(words), default, program_name: "", meaning }
+}
+
 const DIALECTS: &[&str] = &[
     "polar",
     "rrf-direct",
@@ -116,6 +136,11 @@ pub(super) const KEYS: &[Key] = &[
         "max_print_height",
         (200.0, 1.0, 2000.0),
         "greatest height of the lift",
+    ),
+    of_head(
+        "z_min_mm",
+        (0.0, -500.0, 0.0),
+        "least height of the lift; a head that tilts comes down by more than its tip",
     ),
     number(
         Printer,
@@ -352,6 +377,89 @@ pub(super) const KEYS: &[Key] = &[
         &["firmware", "octoprint", "disabled"],
         "how lines of several models are told apart, so that one can be left out: by the firmware's own \
          commands where it has them (EXCLUDE_OBJECT, M486), by comments for OctoPrint, or not",
+    ),
+    choice_of_head(
+        "head",
+        HEADS,
+        "what turns the nozzle: nothing, one tilt in the plane of the rail (B), two tilts (A and B), or \
+         six legs",
+    ),
+    of_head(
+        "pivot_length_mm",
+        (43.0, 1.0, 1000.0),
+        "from the tip of the nozzle to the point it is turned about",
+    ),
+    of_head("tilt_min_deg", (-45.0, -85.0, 0.0), "how far the nozzle tilts inwards, to the axis"),
+    of_head("tilt_max_deg", (45.0, 0.0, 85.0), "how far the nozzle tilts outwards"),
+    of_head("tilt_speed_deg_per_s", (90.0, 0.1, 10_000.0), "greatest speed of a tilt axis"),
+    of_head(
+        "tilt_acceleration_deg_per_s2",
+        (1000.0, 1.0, 1e6),
+        "greatest acceleration of a tilt axis",
+    ),
+    choice_of_head("hexapod_bed", TABLES, "whether the bed turns under a hexapod, or stands"),
+    choice_of_head(
+        "hexapod_layout",
+        LAYOUTS,
+        "where its legs meet: base joints in pairs and three platform joints (6-3), pairs on both \
+         (6-6), three on both (3-3), or the joints given one by one",
+    ),
+    of_head("hexapod_base_radius_mm", (150.0, 1.0, 5000.0), "radius of its base joints"),
+    of_head("hexapod_platform_radius_mm", (60.0, 1.0, 5000.0), "radius of its platform joints"),
+    of_head(
+        "hexapod_base_half_angle_deg",
+        (12.0, 0.0, 59.0),
+        "half the angle between the two base joints of a pair",
+    ),
+    of_head(
+        "hexapod_platform_half_angle_deg",
+        (12.0, 0.0, 59.0),
+        "half the angle between the two platform joints of a pair",
+    ),
+    text(
+        Printer,
+        "hexapod_base_joints_mm",
+        "",
+        "",
+        "base joints one by one, \"x,y,z; …\", six of them, for hexapod_layout = \"joints\"",
+    ),
+    text(
+        Printer,
+        "hexapod_platform_joints_mm",
+        "",
+        "",
+        "platform joints one by one, from the point the nozzle is turned about, in the order of the legs",
+    ),
+    of_head(
+        "hexapod_x_mm",
+        (0.0, -5000.0, 5000.0),
+        "how far the base stands from the axis along x",
+    ),
+    of_head("hexapod_z_mm", (300.0, -5000.0, 5000.0), "how high the base stands over the bed"),
+    of_head(
+        "hexapod_home_mm",
+        (0.0, 0.0, 5000.0),
+        "height between base and platform in the middle of their joints; 0: where legs lean by 45°",
+    ),
+    of_head("leg_min_mm", (50.0, 0.0, 5000.0), "shortest leg, or begin of a slide"),
+    of_head("leg_max_mm", (500.0, 1.0, 5000.0), "longest leg, or end of a slide"),
+    of_head("leg_speed_mm_per_s", (200.0, 1.0, 5000.0), "greatest speed of a leg"),
+    of_head("leg_acceleration_mm_per_s2", (3000.0, 1.0, 1e5), "greatest acceleration of a leg"),
+    of_head(
+        "leg_cone_deg",
+        (45.0, 1.0, 180.0),
+        "how far a leg may lean in its joints from where it points in the middle",
+    ),
+    of_head("leg_distance_mm", (8.0, 0.0, 500.0), "least distance between the middles of two legs"),
+    of_head(
+        "leg_condition_max",
+        (10.0, 1.0, 1e6),
+        "greatest condition number of the legs: how unevenly they hold the platform",
+    ),
+    of_head(
+        "rod_length_mm",
+        (0.0, 0.0, 5000.0),
+        "length of rods whose base joints slide along the vertical; 0 for legs that change their length",
     ),
     text(
         Printer,
