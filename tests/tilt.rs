@@ -108,7 +108,7 @@ fn every_machine_has_its_words_and_proves_its_program() {
 
 #[test]
 fn heads_that_tilt_lay_layers_that_upright_nozzles_refuse() {
-    let steep = ["--layers=conical", "--cone-angle=50"];
+    let steep = ["--layers=conical", "--cone-angle=58"];
     let scratch = Scratch::new();
     let dome = model("dome");
     let slice = ["slice", dome.to_str().unwrap(), "-q", "--scale=0.5", "-o", "a.gcode"];

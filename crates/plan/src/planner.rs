@@ -167,6 +167,7 @@ pub const TOLD_EVERY_S: f64 = 15.0;
 fn timed(steps: Vec<Step>, from: f64, to: f64) -> Vec<Step> {
     let planned = |step: &Step| match step {
         Step::Move(motion) | Step::Arc(Arc { motion, .. }) => motion.duration,
+        Step::Posed(posed) => posed.motion.duration,
         _ => 0.0,
     };
     let all: f64 = steps.iter().map(planned).sum();
