@@ -59,6 +59,7 @@ fn filled(model: &Model, covers: &[Region], job: &Job) -> usize {
         let neighbours = Neighbours {
             above: covers[k + 1..end].iter().collect(),
             below: covers[k.saturating_sub(skins.bottom_layers)..k].iter().rev().collect(),
+            support: None,
         };
         let material = &model.sections[k];
         let lift = Lift {

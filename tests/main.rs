@@ -43,6 +43,7 @@ mod settings;
 mod shared;
 mod slice;
 mod steps;
+mod supports;
 mod sweep;
 mod text;
 mod threads;

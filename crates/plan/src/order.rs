@@ -53,6 +53,14 @@ pub fn order(
     for path in &layer.adhesion {
         ordering.closed_from_nearest(path);
     }
+    if params.uphill && !layer.supports.is_empty() {
+        ordering.all_uphill(layer);
+        return ordering.lines;
+    }
+    let supports: Vec<&Toolpath> = layer.supports.iter().collect();
+    for (path, reversed) in tour(&supports, ordering.nozzle) {
+        ordering.fill(path, reversed);
+    }
     let mut left: Vec<usize> = (0..layer.islands.len()).collect();
     while !left.is_empty() {
         let (k, _) = left
@@ -142,19 +150,37 @@ impl Ordering<'_> {
         }
     }
 
-    /// Lines by height, in bands, each band by nearest neighbour.
     fn island_uphill(&mut self, island: &IslandPaths) {
-        let walls = island.walls.iter().flat_map(|group| &group.loops);
-        let mut lines: Vec<(f64, &Toolpath)> =
-            walls.chain(island.all_fills()).map(|path| (mean_height(path), path)).collect();
+        self.uphill(rising(island).map(|path| (self.island, path)).collect());
+        self.ironing(island);
+    }
+
+    /// A layer whose supports stand close to the islands: a band of height holds lines of all.
+    fn all_uphill(&mut self, layer: &LayerPaths) {
+        let of_islands = layer.islands.iter().enumerate();
+        let of_islands =
+            of_islands.flat_map(|(k, island)| rising(island).map(move |p| (Some(k), p)));
+        self.uphill(layer.supports.iter().map(|path| (None, path)).chain(of_islands).collect());
+        for (k, island) in layer.islands.iter().enumerate() {
+            self.island = Some(k);
+            self.ironing(island);
+        }
+    }
+
+    /// Lines by height, in bands, each band by nearest neighbour.
+    fn uphill(&mut self, paths: Vec<(Option<usize>, &Toolpath)>) {
+        let with_height = paths.into_iter().map(|(island, path)| (mean_height(path), island, path));
+        let mut lines: Vec<(f64, Option<usize>, &Toolpath)> = with_height.collect();
         lines.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut rest = &lines[..];
-        while let Some(&(lowest, _)) = rest.first() {
+        while let Some(&(lowest, ..)) = rest.first() {
             let (band, above) =
-                rest.split_at(rest.partition_point(|(height, _)| *height <= lowest + BAND_MM));
+                rest.split_at(rest.partition_point(|(height, ..)| *height <= lowest + BAND_MM));
             rest = above;
-            let paths: Vec<&Toolpath> = band.iter().map(|(_, path)| *path).collect();
-            for (path, reversed) in tour(&paths, self.nozzle) {
+            let paths: Vec<&Toolpath> = band.iter().map(|(.., path)| *path).collect();
+            for (index, reversed) in tour_by_index(&paths, self.nozzle) {
+                let path = paths[index];
+                self.island = band[index].1;
                 match path.role {
                     Role::ExternalPerimeter if path.closed => {
                         let line = plane(path);
@@ -165,7 +191,6 @@ impl Ordering<'_> {
                 }
             }
         }
-        self.ironing(island);
     }
 
     /// The walls along one outline, all begun next to the seam of the external one.
@@ -215,6 +240,11 @@ impl Ordering<'_> {
         }
         self.lines.push(OrderedLine { island: self.island, ..line });
     }
+}
+
+/// The lines of an island but those over all else.
+fn rising(island: &IslandPaths) -> impl Iterator<Item = &Toolpath> {
+    island.walls.iter().flat_map(|group| &group.loops).chain(island.all_fills())
 }
 
 /// Height over which lines of a curved layer may come in any order, mm: two beads side by side on a
@@ -326,6 +356,12 @@ const LEAST_GAIN_MM: f64 = 1e-6;
 
 /// The order in which to lay fills, and whether each is reversed.
 fn tour<'a>(fills: &[&'a Toolpath], start: Point2<f64>) -> Vec<(&'a Toolpath, bool)> {
+    let by_index = tour_by_index(fills, start);
+    by_index.into_iter().map(|(fill, reversed)| (fills[fill], reversed)).collect()
+}
+
+/// The same, with fills by their index.
+fn tour_by_index(fills: &[&Toolpath], start: Point2<f64>) -> Vec<(usize, bool)> {
     let ends: Vec<[Point2<f64>; 2]> = fills
         .iter()
         .map(|fill| {
@@ -338,7 +374,7 @@ fn tour<'a>(fills: &[&'a Toolpath], start: Point2<f64>) -> Vec<(&'a Toolpath, bo
     if tour.len() <= MOST_IMPROVED {
         improve(&mut tour, &ends, start);
     }
-    tour.into_iter().map(|stop| (fills[stop.fill], stop.reversed)).collect()
+    tour.into_iter().map(|stop| (stop.fill, stop.reversed)).collect()
 }
 
 #[derive(Clone, Copy)]

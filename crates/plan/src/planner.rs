@@ -131,12 +131,24 @@ impl Totals {
         self.volume.iter().sum()
     }
 
-    /// Returns the volume laid of the part itself, without skirt and brim, mm³.
+    /// Returns the volume laid of the part itself, without skirt, brim and supports, mm³.
     #[must_use]
     pub fn part(&self) -> f64 {
         let roles = Role::ALL.iter().zip(&self.volume);
-        roles.filter(|(role, _)| **role != Role::SkirtBrim).map(|(_, volume)| volume).sum()
+        let is_part = |role: Role| role != Role::SkirtBrim && !is_support(role);
+        roles.filter(|(role, _)| is_part(**role)).map(|(_, volume)| volume).sum()
     }
+
+    /// Returns the volume laid of supports, mm³.
+    #[must_use]
+    pub fn supports(&self) -> f64 {
+        let roles = Role::ALL.iter().zip(&self.volume);
+        roles.filter(|(role, _)| is_support(**role)).map(|(_, volume)| volume).sum()
+    }
+}
+
+fn is_support(role: Role) -> bool {
+    matches!(role, Role::SupportMaterial | Role::SupportInterface)
 }
 
 /// Why a layer cannot be planned.

@@ -62,3 +62,4 @@ mod stack;
 pub mod stages;
 pub mod stopwatch;
 pub mod summary;
+mod supports;

@@ -42,6 +42,7 @@ use crate::settings::{Job, Settings};
 use crate::stack::Stack;
 use crate::stages::{LayerKind, Stage, stages};
 use crate::stopwatch::Stopwatch;
+use crate::supports::supports;
 
 /// What to slice and how.
 pub struct Request<'a> {
@@ -295,7 +296,7 @@ const RECENTRED_MM: f64 = 0.01;
 
 /// Layers that are worked at once. Enough to keep all threads busy; a window of a fine model is a
 /// few megabytes.
-const WINDOW: usize = 64;
+pub(crate) const WINDOW: usize = 64;
 
 /// What the layers amount to.
 #[derive(Default)]
@@ -330,6 +331,7 @@ fn layers(
     watch: &mut Watch<'_>,
 ) -> Result<Printed, Failure> {
     let mut printed = Printed::default();
+    let columns = supports(parts.all, stages, job, watch)?;
     let mut planner = Planner::new(&job.printer, job.plan);
     if job.tells_progress {
         planner = planner.telling_time();
@@ -348,6 +350,9 @@ fn layers(
             write(text, &[surface_remark(stage, stage.printed.start)])?;
         }
         let mut stacks = stacks(parts.groups, parts.all, stage, below, job);
+        if let Some(first) = stacks.first_mut() {
+            first.stand_on(&columns[index]);
+        }
         for start in stage.printed.clone().step_by(WINDOW) {
             watch.interrupt.check()?;
             let window = start..(start + WINDOW).min(stage.printed.end);

@@ -190,10 +190,16 @@ pub struct Print {
     pub filament_mm: f64,
     /// Its weight.
     pub filament_g: f64,
-    /// Volume laid, skirt and brim included.
+    /// Volume laid, skirt, brim and supports included.
     pub extruded_mm3: f64,
     /// Volume of the part itself.
     pub part_mm3: f64,
+    /// Filament of supports; absent when there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub support_filament_mm: Option<f64>,
+    /// Its weight.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub support_filament_g: Option<f64>,
     /// Way without laying material.
     pub travel_mm: f64,
     /// Moves of the nozzle.

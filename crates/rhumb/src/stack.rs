@@ -1,6 +1,7 @@
 //! The sections that a window of layers needs: its own, and those above and below that decide on
 //! its skins.
 
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::ops::Range;
 
@@ -11,15 +12,19 @@ use rayon::prelude::*;
 use slicer::chart::{carried, carried_to_cone};
 use slicer::compensation::{CompensationParams, compensated};
 use slicer::layer::{Filled, fill_layer};
-use slicer::level::Level;
 use slicer::lift::Lift;
 use slicer::section::{Cutter, Section, Tears};
 use slicer::skins::{Neighbours, SKIN_TOLERANCE_MM};
 use slicer::stacking::{Side, Stair};
+use slicer::support::{Column, Shade, SupportParams, hanging};
 use slicer::surface::LayerSurface;
 
 use crate::settings::Job;
 use crate::stages::Stage;
+
+/// How closely layers as seen along the axis follow their outlines, mm: supports keep more than ten
+/// times that distance.
+const SEEN_TOLERANCE_MM: f64 = 0.02;
 
 /// Sections of a stage, as far as they are needed. See the [module](self).
 pub(crate) struct Stack<'a> {
@@ -30,6 +35,8 @@ pub(crate) struct Stack<'a> {
     /// The curved layers that the first planar one lies on.
     stair: Option<Stair<'a>>,
     job: &'a Job,
+    /// The supports of the layers printed, if there are any.
+    columns: &'a [Column],
     /// Sections from `first` on, each with a thinned-out copy for comparing layers.
     sections: VecDeque<(Section, Region)>,
     first: usize,
@@ -47,7 +54,13 @@ impl<'a> Stack<'a> {
         let skins = &job.paths.skins;
         let first = stage.printed.start.saturating_sub(skins.bottom_layers.max(1));
         let stair = below.and_then(|below| below.stair(&stage.levels[stage.printed.start]));
-        Self { solid, cutter, stage, stair, job, sections: VecDeque::new(), first }
+        let sections = VecDeque::new();
+        Self { solid, cutter, stage, stair, job, columns: &[], sections, first }
+    }
+
+    /// Stands on these supports, of which there is one for every layer printed.
+    pub(crate) fn stand_on(&mut self, columns: &'a [Column]) {
+        self.columns = columns;
     }
 
     /// Cuts what is missing for a window and drops what no later window needs; `torn` sees every
@@ -103,76 +116,98 @@ impl<'a> Stack<'a> {
     }
 
     fn fill_one(&self, k: usize) -> Filled {
-        let Stage { surface, levels, floor, ceiling, .. } = self.stage;
-        if let Some(sides) = &self.stage.morph {
-            return self.fill_morphed(k, [&sides[k], &sides[k + 1]]);
-        }
-        let stair = self.stair.filter(|_| k == self.stage.printed.start);
-        let lift = Lift {
-            surface: &**surface,
-            level: levels[k],
-            floor: *floor,
-            ceiling: *ceiling,
-            stair,
-            below: None,
-        };
-        let region = &self.sections[k - self.first].0.region;
-        if surface.form().is_flat() {
-            let (above, below) = self.beside(k);
-            let at = |i: &usize| &self.sections[i - self.first].1;
-            let neighbours = Neighbours {
-                above: above.iter().map(at).collect(),
-                below: below.iter().map(at).collect(),
-            };
-            // Cones without slope are planes that may begin and end anywhere.
-            if floor.is_some() || ceiling.is_some() {
-                let material = lift.printable(region);
-                return fill_layer(&lift, &material, &neighbours, &self.job.paths);
-            }
-            return fill_layer(&lift, region, &neighbours, &self.job.paths);
-        }
-        // The nozzle runs on the upper side, and that is where regions are compared.
-        let upper = levels[k].upper;
-        let to_upper =
-            |region: &Region, level: &Level| carried(lift.surface, region, level.middle(), upper);
-        let material = lift.printable(&to_upper(region, &levels[k]));
-        if material.is_empty() {
+        let lift = self.lift(k);
+        let support = self.columns.get(k.wrapping_sub(self.stage.printed.start));
+        let support = support.filter(|column| !column.is_empty());
+        let material = self.material(k, &lift);
+        if material.is_empty() && support.is_none() {
             return Filled::default();
         }
         let (above, below) = self.beside(k);
-        let cover = |i: &usize| to_upper(&self.sections[i - self.first].1, &levels[*i]);
-        let above: Vec<Region> = above.iter().map(cover).collect();
-        let below: Vec<Region> = below.iter().map(cover).collect();
-        let neighbours =
-            Neighbours { above: above.iter().collect(), below: below.iter().collect() };
+        let cover = |i: &usize| self.at_upper(&self.sections[i - self.first].1, *i, k, &lift);
+        let above: Vec<Cow<'_, Region>> = above.iter().map(cover).collect();
+        let below: Vec<Cow<'_, Region>> = below.iter().map(cover).collect();
+        let neighbours = Neighbours {
+            above: above.iter().map(AsRef::as_ref).collect(),
+            below: below.iter().map(AsRef::as_ref).collect(),
+            support,
+        };
         fill_layer(&lift, &material, &neighbours, &self.job.paths)
     }
 
-    /// Fills a layer between two sides that are not alike. Regions are compared straight up and down:
-    /// side faces then lie on top of each other.
-    fn fill_morphed(&self, k: usize, [lower, upper]: [&Side; 2]) -> Filled {
-        let level = self.stage.levels[k];
-        let (surface, below) = (&upper.cone, Some(*lower));
-        let lift = Lift { surface, level, floor: None, ceiling: None, stair: None, below };
-        let half = |r: f64| {
-            let at = Point3::new(r, 0.0, upper.cone.height(upper.level, r));
-            lift.thickness(&at) / 2.0
-        };
-        let to_upper = |region: &Region, i: usize| match self.middle(i) {
-            Some(middle) => carried_to_cone(region, [&middle.cone, &upper.cone], half),
-            None => Region::default(),
-        };
-        let material = to_upper(&self.sections[k - self.first].0.region, k);
-        if material.is_empty() {
-            return Filled::default();
+    /// Layers of a window as they are seen along the axis, for what supports them.
+    pub(crate) fn shades(&self, window: Range<usize>, params: &SupportParams) -> Vec<Shade> {
+        window.into_par_iter().map(|k| self.shade(k, params)).collect()
+    }
+
+    fn shade(&self, k: usize, params: &SupportParams) -> Shade {
+        let lift = self.lift(k);
+        let material = self.material(k, &lift);
+        let level = &self.stage.levels[k];
+        let chart = lift.surface.chart(level.upper);
+        let thickness = level.thickness() / lift.surface.level_step(1.0);
+        let on_bed = level.index == 0 && self.stage.floor.is_none();
+        let below = k.checked_sub(1).filter(|i| *i >= self.first && !on_bed);
+        let hanging = below.filter(|_| !material.is_empty()).map(|i| {
+            let below = self.at_upper(&self.sections[i - self.first].1, i, k, &lift);
+            hanging(&material, &below, &chart, thickness, params)
+        });
+        let seen = |region: &Region| chart.region_from_above(region).thinned(SEEN_TOLERANCE_MM);
+        Shade {
+            material: seen(&material),
+            hanging: hanging.map(|region| seen(&region)).unwrap_or_default(),
+            thickness,
         }
-        let (above, below) = self.beside(k);
-        let cover = |i: &usize| to_upper(&self.sections[i - self.first].1, *i);
-        let above: Vec<Region> = above.iter().map(cover).collect();
-        let below: Vec<Region> = below.iter().map(cover).collect();
-        let neighbours =
-            Neighbours { above: above.iter().collect(), below: below.iter().collect() };
-        fill_layer(&lift, &material, &neighbours, &self.job.paths)
+    }
+
+    fn lift(&self, k: usize) -> Lift<'_> {
+        let Stage { surface, levels, floor, ceiling, .. } = self.stage;
+        let level = levels[k];
+        if let Some(sides) = &self.stage.morph {
+            let (surface, below) = (&sides[k + 1].cone, Some(sides[k]));
+            return Lift { surface, level, floor: None, ceiling: None, stair: None, below };
+        }
+        let stair = self.stair.filter(|_| k == self.stage.printed.start);
+        let (floor, ceiling) = (*floor, *ceiling);
+        Lift { surface: &**surface, level, floor, ceiling, stair, below: None }
+    }
+
+    /// The material of a layer on its upper side.
+    fn material(&self, k: usize, lift: &Lift<'_>) -> Cow<'_, Region> {
+        let region = self.at_upper(&self.sections[k - self.first].0.region, k, k, lift);
+        // Cones without slope are planes that may begin and end anywhere.
+        if lift.floor.is_none() && lift.ceiling.is_none() {
+            return region;
+        }
+        Cow::Owned(lift.printable(&region))
+    }
+
+    /// A region of layer `i`, taken to the upper side of layer `k`: there the nozzle runs, and that is
+    /// where regions are compared.
+    fn at_upper<'r>(
+        &self,
+        region: &'r Region,
+        i: usize,
+        k: usize,
+        lift: &Lift<'_>,
+    ) -> Cow<'r, Region> {
+        let levels = &self.stage.levels;
+        if let Some(sides) = &self.stage.morph {
+            let upper = &sides[k + 1];
+            let half = |r: f64| {
+                let at = Point3::new(r, 0.0, upper.cone.height(upper.level, r));
+                lift.thickness(&at) / 2.0
+            };
+            // Between sides that are not alike regions are compared straight up and down: side faces
+            // then lie on top of each other.
+            let middle = self.middle(i);
+            let carried = middle.map(|m| carried_to_cone(region, [&m.cone, &upper.cone], half));
+            return Cow::Owned(carried.unwrap_or_default());
+        }
+        if lift.surface.form().is_flat() {
+            return Cow::Borrowed(region);
+        }
+        Cow::Owned(carried(lift.surface, region, levels[i].middle(), levels[k].upper))
     }
 
     /// The layers above and below that decide on the skins of layer `k`, the nearest first.

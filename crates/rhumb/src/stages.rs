@@ -25,6 +25,7 @@ use slicer::clearance::{LayerOrder, Uphill, steepest_slope};
 use slicer::level::{Level, Snap};
 use slicer::lift::LEAST_WEDGE_SHARE;
 use slicer::stacking::{Side, Stair};
+use slicer::support::MARGIN_MM;
 use slicer::surface::{Caps, Cone, Extent, Form, LayerSurface, Plane, Spheres, SurfaceError};
 
 use crate::blend;
@@ -410,10 +411,12 @@ fn curved(
     // the axis. Layers that turn out empty are left out later.
     let least = if let Some(start) = start {
         start
-    } else if surface.form().is_mirrored() {
+    } else if surface.form().is_mirrored() && job.paths.support.is_none() {
         least_of_bowls(part, &*surface, floor)
     } else {
-        level(0.0, floor).min(level(radius, floor))
+        // Supports reach beyond the part.
+        let margin = if job.paths.support.is_some() { MARGIN_MM } else { 0.0 };
+        level(0.0, floor).min(level(radius + margin, floor))
     };
     let greatest = part.vertices.iter().map(|p| surface.level(p)).fold(level(0.0, top), f64::max);
     let step = surface.level_step(job.schedule.layer_height);

@@ -17,7 +17,6 @@ use crate::report::{
 };
 use crate::settings::Job;
 use machine::gcode::decimal;
-use machine::program::Role;
 
 /// Returns the report of a slice. The other ways to lie are rated for a report that is written out
 /// (`ranks`); the summary does not tell them.
@@ -33,10 +32,7 @@ pub fn report(
     let volume = volume(part);
     let bounds = part.bounds();
     let corner = |p: Point3<f64>| [p.x, p.y, p.z];
-    let skirt = Role::ALL
-        .iter()
-        .position(|role| *role == Role::SkirtBrim)
-        .map_or(0.0, |k| totals.volume[k]);
+    let supports = Some(totals.supports()).filter(|volume| *volume > 0.0);
     Report {
         rhumb: env!("CARGO_PKG_VERSION"),
         model: Model {
@@ -74,7 +70,9 @@ pub fn report(
             filament_mm: totals.filament,
             filament_g: totals.filament * job.plan.filament.area * job.density_g_per_mm3,
             extruded_mm3: totals.extruded(),
-            part_mm3: totals.extruded() - skirt,
+            part_mm3: totals.part(),
+            support_filament_mm: supports.map(|volume| volume / job.plan.filament.area),
+            support_filament_g: supports.map(|volume| volume * job.density_g_per_mm3),
             travel_mm: totals.travel,
             moves: totals.moves,
             retractions: totals.retractions,
@@ -206,6 +204,12 @@ pub fn text(
             decimal(report.print.filament_g, 1)
         ),
     );
+    if let (Some(length), Some(weight)) =
+        (report.print.support_filament_mm, report.print.support_filament_g)
+    {
+        let (length, weight) = (decimal(length / 1000.0, 2), decimal(weight, 1));
+        row("supports", format!("{length} m, {weight} g of that"));
+    }
     row("bed", format!("{} turns", decimal(report.print.bed_turns, 0)));
     if let Some(slow) = &report.print.slow_flow {
         row("slow flow", slow.to_string());

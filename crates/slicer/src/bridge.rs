@@ -8,7 +8,7 @@
 //!
 //! On curved layers lines are straight as seen along the axis.
 
-use geom::region::Region;
+use geom::region::{Fill, Region};
 use nalgebra::{Point2, Vector2};
 
 use crate::chart::Chart;
@@ -109,6 +109,32 @@ fn spans(gap: &Region, near: &Region, angle: f64, spacing: f64) -> Option<Spans>
     (anchored > 0.0).then(|| Spans { angle, anchored: anchored / all, longest })
 }
 
+/// Returns where gaps are spanned by straight lines of at most `longest` mm that are anchored at both
+/// ends; `below` is the material of the layer below, `spacing` that of the lines, mm.
+#[must_use]
+pub fn spanned(gaps: &Region, below: &Region, chart: &Chart, spacing: f64, longest: f64) -> Region {
+    let mut strips: Vec<Vec<Point2<f64>>> = Vec::new();
+    for island in chart.opened(gaps, LEAST_GAP_IN_SPACINGS * spacing / 2.0).islands() {
+        let gap = Region::from_island(island.clone());
+        let Some(angle) = direction(&gap, below, chart, spacing) else { continue };
+        let along = Vector2::new(angle.cos(), angle.sin());
+        // A little wider than their distance, so that strips beside each other leave nothing.
+        let aside = Vector2::new(-along.y, along.x) * (0.51 * spacing);
+        let gap = chart.region_from_above(&gap);
+        let below = chart.region_from_above(below);
+        for [from, to] in straight_lines(&gap, spacing, angle) {
+            let way = along * (to - from).dot(&along).signum() * spacing;
+            let (from, to) = (from - way, to + way);
+            let is_anchored = below.contains(&from) && below.contains(&to);
+            if is_anchored && (to - from).norm() <= longest + 2.0 * spacing {
+                strips.push(vec![from - aside, to - aside, to + aside, from + aside]);
+            }
+        }
+    }
+    let strips = Region::from_rings(strips.iter().map(Vec::as_slice), Fill::NonZero);
+    chart.region_under(&strips)
+}
+
 /// Returns the places of an interior with nothing below, but for those narrower than a line;
 /// `spacing` is that of the lines, mm.
 #[must_use]
@@ -122,7 +148,6 @@ pub fn unsupported(interior: &Region, below: &Region, chart: &Chart, spacing: f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geom::region::Fill;
     use std::f64::consts::{FRAC_PI_2, PI};
 
     fn rectangle(x: [f64; 2], y: [f64; 2]) -> Region {

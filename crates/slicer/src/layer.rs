@@ -13,10 +13,12 @@ use crate::chart::Chart;
 use crate::compensation::CompensationParams;
 use crate::fuzzy::{FuzzyParams, roughened};
 use crate::hanging::Below;
+use crate::infill;
 use crate::infill::ironing::ironing;
 use crate::infill::{FillLayer, FillLine, InfillParams, angle_in, fill, fill_bridge};
 use crate::lift::Lift;
 use crate::skins::{Neighbours, SKIN_TOLERANCE_MM, SkinParams, skins};
+use crate::support::SupportParams;
 use crate::thin::{AxisPoint, ThinParams, axes};
 use crate::toolpath::{IslandPaths, LayerPaths, LostArea, Role, Toolpath, WallGroup};
 use crate::walls::{ThinPlace, WallParams, Walls, split_thin, walls};
@@ -38,6 +40,8 @@ pub struct PathParams {
     pub compensation: CompensationParams,
     /// How rough outer walls are, if they are.
     pub fuzzy: Option<FuzzyParams>,
+    /// How it is supported, if it is.
+    pub support: Option<SupportParams>,
     /// Whether there is a single climbing wall above the bottom.
     pub vase: bool,
     /// How far simplified lines may lie from their course, mm.
@@ -93,7 +97,10 @@ pub fn fill_layer(
     };
     if level.index > 0 {
         let ground = neighbours.below.first().map(|below| Ground::of(below)).unwrap_or_default();
-        let floats = |island: &&Island| !ground.carries(island);
+        let carried = neighbours.support.map(|column| &column.carried);
+        let carried = carried.map(|seen| frame.chart.region_under(seen)).unwrap_or_default();
+        let column = Ground::of(&carried);
+        let floats = |island: &&Island| !ground.carries(island) && !column.carries(island);
         filled.floating =
             material.filtered(floats).islands().iter().map(|i| frame.floating(i)).collect();
     }
@@ -101,9 +108,12 @@ pub fn fill_layer(
         filled.paths.lost.merge(&lost);
         filled.paths.islands.push(paths);
     }
+    filled.paths.supports = supports(neighbours, &frame, params);
     if level.index == 0 && frame.chart.is_flat() {
         let bead = Bead { width: params.walls.width, thickness: frame.thickness };
-        let adhesion = around(material, bead.width, bead.spacing(), &params.adhesion);
+        let stands = neighbours.support.map(|column| material.union(&column.whole));
+        let stands = stands.as_ref().unwrap_or(material);
+        let adhesion = around(stands, bead.width, bead.spacing(), &params.adhesion);
         filled.adhesion_out_of_reach = adhesion.out_of_reach;
         filled.paths.adhesion = adhesion
             .loops
@@ -112,6 +122,23 @@ pub fn fill_layer(
             .collect();
     }
     filled
+}
+
+/// The lines of what supports the part.
+fn supports(neighbours: &Neighbours<'_>, frame: &Frame<'_>, params: &PathParams) -> Vec<Toolpath> {
+    let (Some(column), Some(how)) = (neighbours.support, &params.support) else {
+        return Vec::new();
+    };
+    let here = |seen: &Region| {
+        let is_limited = frame.lift.floor.is_some() || frame.lift.ceiling.is_some();
+        if seen.is_empty() || !is_limited {
+            return seen.clone();
+        }
+        let laid = frame.lift.printable(&frame.chart.region_under(seen));
+        frame.chart.region_from_above(&laid)
+    };
+    let lines = infill::support::lines(column, here, &frame.fill_layer(params), how);
+    lines.iter().map(|line| frame.fill(line)).collect()
 }
 
 /// Whether a layer of a vase is none of its solid bottom, and nowhere ends on the flat layers that
@@ -210,14 +237,7 @@ fn fill_island(
     let solid_bead = Bead { width: params.infill.solid_width, thickness };
     let split = split_thin(&walls.interior, &chart, solid_bead.spacing() / 2.0);
     let index = frame.lift.level.index;
-    let layer = FillLayer {
-        index,
-        chart,
-        surface: frame.lift.surface,
-        level: frame.lift.level.upper,
-        thickness,
-        tolerance: params.tolerance,
-    };
+    let layer = frame.fill_layer(params);
     let interior = split.thick.thinned(SKIN_TOLERANCE_MM);
     let spacing = solid_bead.spacing();
     let mut skins = skins(&interior, &chart, neighbours, spacing, &params.skins);
@@ -357,6 +377,17 @@ impl<'a> Frame<'a> {
             lift,
             chart: lift.surface.chart(lift.level.upper),
             thickness: lift.level.thickness() / lift.surface.level_step(1.0),
+        }
+    }
+
+    fn fill_layer(&self, params: &PathParams) -> FillLayer<'_> {
+        FillLayer {
+            index: self.lift.level.index,
+            chart: self.chart,
+            surface: self.lift.surface,
+            level: self.lift.level.upper,
+            thickness: self.thickness,
+            tolerance: params.tolerance,
         }
     }
 

@@ -7,7 +7,8 @@
 //! [`level`] says where they lie, [`section`] cuts the mesh, [`walls`], [`thin`], [`skins`] and
 //! [`infill`] fill an island, [`adhesion`] surrounds the first layer, [`layer`] puts it together
 //! into [`toolpath`]s of [`bead`]s. [`stacking`] tells how thick beads are on a flat base,
-//! [`overhang`] what hangs in the air, [`bridge`] what spans a gap, [`clearance`] how steep layers may
+//! [`overhang`] what hangs in the air, [`bridge`] what spans a gap, [`support`] what is
+//! built under the rest, [`clearance`] how steep layers may
 //! be; [`compensation`] and [`fuzzy`] move outlines on purpose.
 
 pub mod adhesion;
@@ -26,6 +27,7 @@ pub mod overhang;
 pub mod section;
 pub mod skins;
 pub mod stacking;
+pub mod support;
 pub mod surface;
 pub mod thin;
 pub mod toolpath;

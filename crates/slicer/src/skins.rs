@@ -10,6 +10,7 @@ use geom::region::Region;
 
 use crate::bridge::unsupported;
 use crate::chart::Chart;
+use crate::support::Column;
 
 /// How many layers close the part, and when a small place is not worth leaving sparse.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +46,8 @@ pub struct Neighbours<'a> {
     pub above: Vec<&'a Region>,
     /// Regions of the layers below.
     pub below: Vec<&'a Region>,
+    /// The supports of this layer, as they are seen along the axis.
+    pub support: Option<&'a Column>,
 }
 
 /// How closely skins follow outlines, mm: lines that begin 10 µm sooner or later are the same lines,
@@ -178,7 +181,8 @@ mod tests {
     #[test]
     fn deep_inside_all_is_sparse() {
         let (interior, outline) = (square(18.0), square(20.0));
-        let neighbours = Neighbours { above: vec![&outline; 3], below: vec![&outline; 2] };
+        let neighbours =
+            Neighbours { above: vec![&outline; 3], below: vec![&outline; 2], support: None };
         let skins = skins(&interior, &Chart::Plane, &neighbours, 0.4, &PARAMS);
         assert!(skins.top.is_empty() && skins.solid.is_empty());
         assert!((skins.sparse.area() - 324.0).abs() < 0.1);
@@ -187,14 +191,15 @@ mod tests {
     #[test]
     fn too_few_layers_above_or_below_make_it_solid() {
         let (interior, outline) = (square(18.0), square(20.0));
-        let near_top = Neighbours { above: vec![&outline; 2], below: vec![&outline; 5] };
+        let near_top =
+            Neighbours { above: vec![&outline; 2], below: vec![&outline; 5], support: None };
         let near_top = skins(&interior, &Chart::Plane, &near_top, 0.4, &PARAMS);
         assert!(near_top.sparse.is_empty() && near_top.top.is_empty());
         check(&near_top, &interior);
-        let topmost = Neighbours { above: vec![], below: vec![&outline; 5] };
+        let topmost = Neighbours { above: vec![], below: vec![&outline; 5], support: None };
         let topmost = skins(&interior, &Chart::Plane, &topmost, 0.4, &PARAMS);
         assert!((topmost.top.area() - interior.area()).abs() < 1e-6);
-        let bottom = Neighbours { above: vec![&outline; 3], below: vec![] };
+        let bottom = Neighbours { above: vec![&outline; 3], below: vec![], support: None };
         let bottom = skins(&interior, &Chart::Plane, &bottom, 0.4, &PARAMS);
         assert!(bottom.top.is_empty() && bottom.sparse.is_empty());
     }
@@ -202,7 +207,8 @@ mod tests {
     #[test]
     fn a_step_is_solid_around_and_seen_from_above() {
         let (interior, outline, smaller) = (square(18.0), square(20.0), square(10.0));
-        let neighbours = Neighbours { above: vec![&smaller; 3], below: vec![&outline; 2] };
+        let neighbours =
+            Neighbours { above: vec![&smaller; 3], below: vec![&outline; 2], support: None };
         let parts = skins(&interior, &Chart::Plane, &neighbours, 0.4, &PARAMS);
         check(&parts, &interior);
         // Two lines of 0.4 mm reach under the walls of the step.
@@ -214,7 +220,8 @@ mod tests {
     #[test]
     fn all_solid_leaves_nothing_sparse() {
         let (interior, outline) = (square(18.0), square(20.0));
-        let neighbours = Neighbours { above: vec![&outline; 3], below: vec![&outline; 2] };
+        let neighbours =
+            Neighbours { above: vec![&outline; 3], below: vec![&outline; 2], support: None };
         let parts = skins(
             &interior,
             &Chart::Plane,

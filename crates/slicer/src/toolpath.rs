@@ -145,6 +145,8 @@ pub struct LayerPaths {
     pub thickness: f64,
     /// Skirt and brim, before all else.
     pub adhesion: Vec<Toolpath>,
+    /// Supports, before the islands.
+    pub supports: Vec<Toolpath>,
     /// The islands.
     pub islands: Vec<IslandPaths>,
     /// What could not be filled.
@@ -161,7 +163,7 @@ impl LayerPaths {
         let mut loops = island.walls.iter().flat_map(|group| &group.loops);
         let wall = loops.next()?;
         let is_alone = loops.next().is_none() && island.all_fills().next().is_none();
-        (is_alone && self.adhesion.is_empty()).then_some(wall)
+        (is_alone && self.adhesion.is_empty() && self.supports.is_empty()).then_some(wall)
     }
 
     /// Returns whether nothing is laid.
@@ -172,7 +174,7 @@ impl LayerPaths {
                 && island.in_order.is_empty()
                 && island.walls.iter().all(|group| group.loops.is_empty())
         };
-        self.adhesion.is_empty() && self.islands.iter().all(is_empty)
+        self.adhesion.is_empty() && self.supports.is_empty() && self.islands.iter().all(is_empty)
     }
 }
 

@@ -39,10 +39,21 @@ struct Cell {
     /// The pieces whose height `top` and `under` are.
     top_piece: u32,
     under_piece: u32,
+    /// Whether they belong to supports.
+    top_supports: bool,
+    under_supports: bool,
 }
 
-const BARE: Cell =
-    Cell { top: 0.0, under: 0.0, layer: NONE, stroke: NONE, top_piece: NONE, under_piece: NONE };
+const BARE: Cell = Cell {
+    top: 0.0,
+    under: 0.0,
+    layer: NONE,
+    stroke: NONE,
+    top_piece: NONE,
+    under_piece: NONE,
+    top_supports: false,
+    under_supports: false,
+};
 
 #[derive(Debug, Clone)]
 struct Tile {
@@ -74,6 +85,8 @@ pub(crate) struct Piece {
     pub(crate) layer: u32,
     /// The number of the stroke that it belongs to.
     pub(crate) stroke: u32,
+    /// Whether it belongs to supports.
+    pub(crate) supports: bool,
 }
 
 impl Piece {
@@ -171,6 +184,13 @@ pub(crate) trait Underside {
 /// Half: below, the bead is squeezed out by half; above, it still touches what sags.
 const TOUCHING: f64 = 0.5;
 
+/// How far above supports a bead of the part may end and still be carried by them, mm; and supports
+/// above the part. That gap is left so that they come off, and the bead sags onto them.
+const LOOSE: f64 = 0.35;
+
+/// The same in thicknesses of the bead, where that is more: supports keep away by whole layers.
+const LOOSE_SHARE: f64 = 1.5;
+
 /// From the upper side of a bead to the middle of the layer below, in thicknesses.
 pub(crate) const HALFWAY_DOWN: f64 = 1.5;
 
@@ -250,10 +270,12 @@ impl Pile {
                 if top.z.is_finite() && piece.reaches(&top) {
                     let own = footing.own;
                     self.lay_cell([column, row], top.z, piece, &mut footing);
-                    let depth = self.gap_under(&(top + down), piece);
-                    if depth <= TOUCHING * piece.thickness {
+                    let (depth, on_supports) = self.gap_under(&(top + down), piece);
+                    let touching = TOUCHING * piece.thickness;
+                    let loose = LOOSE.max(LOOSE_SHARE * piece.thickness);
+                    if depth <= if on_supports == piece.supports { touching } else { loose } {
                         footing.resting += 1;
-                        footing.lacking += depth.max(-TOUCHING * piece.thickness);
+                        footing.lacking += depth.clamp(-touching, touching);
                     } else {
                         let below = top + down * HALFWAY_DOWN;
                         let is_new = footing.own == own;
@@ -284,11 +306,13 @@ impl Pile {
         } else {
             (cell.under, cell.layer) = (cell.top, piece.layer);
             cell.under_piece = cell.top_piece;
+            cell.under_supports = cell.top_supports;
         }
         cell.stroke = piece.stroke;
         let height = top as f32;
         if height > cell.top {
             (cell.top, cell.top_piece) = (height, (self.shapes.len() - 1) as u32);
+            cell.top_supports = piece.supports;
         }
         let block = &mut tile.blocks[y / BLOCK * (TILE / BLOCK) + x / BLOCK];
         *block = block.max(height);
@@ -296,13 +320,19 @@ impl Pile {
         self.greatest = self.greatest.max(top);
     }
 
-    /// How far below the bottom of a bead the next thing lies, mm; negative where it rises above.
-    fn gap_under(&self, bottom: &Point3<f64>, piece: &Piece) -> f64 {
+    /// How far below the bottom of a bead the next thing lies, mm; negative where it rises above. And
+    /// whether that belongs to supports, or, under supports, to the part: the bed carries both.
+    fn gap_under(&self, bottom: &Point3<f64>, piece: &Piece) -> (f64, bool) {
         let (column, row) = (self.index(bottom.x), self.index(bottom.y));
         let tile = &self.tiles[row / TILE * self.side + column / TILE];
         let cell = tile.as_ref().map_or(BARE, |tile| tile.cells[row % TILE * TILE + column % TILE]);
-        let under = if cell.layer == piece.layer { cell.under } else { cell.top };
-        bottom.z - f64::from(under)
+        let (under, supports, by) = if cell.layer == piece.layer {
+            (cell.under, cell.under_supports, cell.under_piece)
+        } else {
+            (cell.top, cell.top_supports, cell.top_piece)
+        };
+        let on_supports = if by == NONE { piece.supports } else { supports };
+        (bottom.z - f64::from(under), on_supports)
     }
 
     /// Returns the true shape of a piece.
@@ -393,6 +423,7 @@ mod tests {
             family: Family::Planar,
             layer,
             stroke,
+            supports: false,
         }
     }
 

@@ -167,6 +167,7 @@ impl<'a> Watch<'a> {
         if !lays {
             return;
         }
+        let is_support = is_support(segment.role);
         let footing = self.pile.lay(&Piece {
             ends,
             half_width: segment.width / 2.0,
@@ -174,16 +175,18 @@ impl<'a> Watch<'a> {
             family: mark.family.unwrap_or_default(),
             layer,
             stroke: self.stroke,
+            supports: is_support,
         });
         let is_inside = footing.resting < footing.covered && self.is_inside(&ends, segment.role);
-        let step = Step { line: segment.line, layer: segment.layer, ends, footing, is_inside };
+        let step =
+            Step { line: segment.line, layer: segment.layer, ends, footing, is_inside, is_support };
         self.follow.piece(&step, findings);
         // What fills a gap between walls lies between and under their round sides; ironing lies on
         // what it smooths.
         if !matches!(segment.role, Role::GapFill | Role::Ironing) {
             self.overlap.piece(&step, findings);
         }
-        let Some(hollow) = &mut self.hollow else { return };
+        let Some(hollow) = self.hollow.as_mut().filter(|_| !is_support) else { return };
         let part = self.part.as_ref();
         // Where the layer below is as thick; without a mesh, what the bead is for tells.
         let belongs =
@@ -216,6 +219,10 @@ impl<'a> Watch<'a> {
         let [from, to] = segment.part.map(|p| p.z);
         Point3::new(over_part.x, over_part.y, from + (to - from) * share)
     }
+}
+
+fn is_support(role: Role) -> bool {
+    matches!(role, Role::SupportMaterial | Role::SupportInterface)
 }
 
 /// Where the rail lies over the part while the nozzle is at a place of a segment; of length 1.

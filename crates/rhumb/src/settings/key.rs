@@ -6,6 +6,7 @@
 mod material;
 mod print;
 mod printer;
+mod support;
 
 use std::fmt;
 
@@ -234,8 +235,10 @@ const fn text(
 
 /// All settings, by section, in the order in which they are shown.
 pub const KEYS: &[Key] = &{
-    let sections = [printer::KEYS, material::KEYS, print::KEYS];
-    let mut all = [print::KEYS[0]; printer::KEYS.len() + material::KEYS.len() + print::KEYS.len()];
+    let sections = [printer::KEYS, material::KEYS, print::KEYS, support::KEYS];
+    const COUNT: usize =
+        printer::KEYS.len() + material::KEYS.len() + print::KEYS.len() + support::KEYS.len();
+    let mut all = [print::KEYS[0]; COUNT];
     let (mut at, mut section) = (0, 0);
     while section < sections.len() {
         let mut index = 0;

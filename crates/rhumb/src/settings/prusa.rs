@@ -38,7 +38,7 @@ const OTHER_NAMES: [(&str, &str); 8] = [
 const OTHER_MEANINGS: [&str; 1] = ["gcode_resolution"];
 
 /// What a percentage is of; of itself, the other names say.
-const SHARES_OF: [(&str, &str); 11] = [
+const SHARES_OF: [(&str, &str); 14] = [
     ("first_layer_height", "layer_height"),
     ("external_perimeter_speed", "perimeter_speed"),
     ("first_layer_speed", "perimeter_speed"),
@@ -50,6 +50,9 @@ const SHARES_OF: [(&str, &str); 11] = [
     ("infill_extrusion_width", "layer_height"),
     ("solid_infill_extrusion_width", "layer_height"),
     ("top_infill_extrusion_width", "layer_height"),
+    ("support_material_extrusion_width", "layer_height"),
+    ("support_material_xy_spacing", "external_perimeter_extrusion_width"),
+    ("support_material_interface_speed", "support_material_speed"),
 ];
 
 /// Shares of shares of shares: there are no more.

@@ -29,6 +29,7 @@ use slicer::layer::PathParams;
 use slicer::level::adaptive::AdaptiveParams;
 use slicer::level::{ScheduleParams, Snap};
 use slicer::skins::SkinParams;
+use slicer::support::{SupportParams, SupportPattern};
 use slicer::thin::ThinParams;
 use slicer::walls::WallParams;
 use twin::motor::Motor;
@@ -344,8 +345,7 @@ fn check_layers(get: &Lookup<'_>) -> Result<(), Failure> {
     }
     let thickest = get.number("layer_height_mm").max(get.number("first_layer_height_mm"));
     let nozzle = get.number("nozzle_diameter_mm");
-    for name in WIDTHS {
-        let width = get.number(name);
+    for (name, width) in widths(get) {
         // Below its thickness a line is no bead, above about three bores it does not form one.
         if width < thickest || width > 3.0 * nozzle {
             return Err(Failure::new(
@@ -371,7 +371,16 @@ fn check_layers(get: &Lookup<'_>) -> Result<(), Failure> {
 /// Turns of a vase go over into each other where layers are alike.
 fn check_vase(get: &Lookup<'_>) -> Result<(), Failure> {
     let kind = get.text("layers");
-    if !get.switch("spiral_vase") || ["planar", "conical", "caps"].contains(&kind) {
+    if !get.switch("spiral_vase") {
+        return Ok(());
+    }
+    if get.switch("support_material") {
+        return Err(conflict(
+            "spiral_vase is one line without supports",
+            "support_material = true",
+        ));
+    }
+    if ["planar", "conical", "caps"].contains(&kind) {
         return Ok(());
     }
     Err(conflict("spiral_vase climbs on layers that are all alike (planar, conical, caps)", kind))
@@ -385,9 +394,16 @@ const WIDTHS: [&str; 5] = [
     "top_infill_extrusion_width_mm",
 ];
 
+/// The widths of beads that a print has.
+fn widths(get: &Lookup<'_>) -> impl Iterator<Item = (&'static str, f64)> {
+    let support = Some("support_material_extrusion_width_mm");
+    let support = support.filter(|_| get.switch("support_material"));
+    WIDTHS.into_iter().chain(support).map(|name| (name, get.number(name)))
+}
+
 fn schedule(get: &Lookup<'_>) -> Result<ScheduleParams, Failure> {
     // A bead is no bead when it is thicker than wide.
-    let narrowest = WIDTHS.iter().map(|name| get.number(name)).fold(f64::INFINITY, f64::min);
+    let narrowest = widths(get).map(|(_, width)| width).fold(f64::INFINITY, f64::min);
     let params = ScheduleParams {
         first_layer_height: get.number("first_layer_height_mm"),
         layer_height: get.number("layer_height_mm"),
@@ -490,9 +506,46 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
             depth: get.number("fuzzy_skin_thickness_mm"),
             step: get.number("fuzzy_skin_point_dist_mm"),
         }),
+        support: support(get, printer),
         vase: get.switch("spiral_vase"),
         tolerance: tolerances.simplify_mm(),
     }
+}
+
+/// How parts are supported, if they are.
+fn support(get: &Lookup<'_>, printer: &Printer) -> Option<SupportParams> {
+    if !(get.switch("support_material") && get.switch("support_material_auto")) {
+        return None;
+    }
+    let (top_gap, bottom_gap) = (
+        get.number("support_material_contact_distance_mm"),
+        get.number("support_material_bottom_contact_distance_mm"),
+    );
+    let top_interface = get.count("support_material_interface_layers");
+    let bottom_interface = get.whole("support_material_bottom_interface_layers");
+    let bridges = get.switch("dont_support_bridges");
+    Some(SupportParams {
+        threshold: get.number("support_material_threshold_deg").to_radians(),
+        wall_width: get.number("external_perimeter_extrusion_width_mm"),
+        on_bed_only: get.switch("support_material_buildplate_only"),
+        longest_bridge: if bridges { get.number("max_bridge_length_mm") } else { 0.0 },
+        xy_gap: get.number("support_material_xy_spacing_mm"),
+        top_gap,
+        bottom_gap: if bottom_gap > 0.0 { bottom_gap } else { top_gap },
+        top_interface,
+        bottom_interface: usize::try_from(bottom_interface).unwrap_or(top_interface),
+        width: get.number("support_material_extrusion_width_mm"),
+        spacing: get.number("support_material_spacing_mm"),
+        interface_spacing: get.number("support_material_interface_spacing_mm"),
+        angle: get.number("support_material_angle_deg").to_radians(),
+        pattern: match get.text("support_material_pattern") {
+            "rectilinear-grid" => SupportPattern::RectilinearGrid,
+            "honeycomb" => SupportPattern::Honeycomb,
+            _ => SupportPattern::Rectilinear,
+        },
+        sheath: get.switch("support_material_with_sheath"),
+        reach: printer.rail.max,
+    })
 }
 
 fn pattern(word: &str) -> Pattern {
@@ -562,7 +615,10 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
             bridge: get.number("bridge_speed_mm_per_s"),
             overhang: [3, 2, 1, 0].map(|k| get.number(&format!("overhang_speed_{k}_mm_per_s"))),
             ironing: get.number("ironing_speed_mm_per_s"),
-            support: [get.number("infill_speed_mm_per_s"); 2],
+            support: [
+                get.number("support_material_speed_mm_per_s"),
+                get.number("support_material_interface_speed_mm_per_s"),
+            ],
             first_layer: get.number("first_layer_speed_mm_per_s"),
             travel: get.number("travel_speed_mm_per_s"),
         },
@@ -672,6 +728,13 @@ impl Lookup<'_> {
         match self.value(name) {
             Value::Number(number) => *number,
             other => unreachable!("{name} is a number, not {other}"),
+        }
+    }
+
+    fn whole(&self, name: &str) -> i64 {
+        match self.value(name) {
+            Value::Count(count) => *count,
+            other => unreachable!("{name} is a count, not {other}"),
         }
     }
 

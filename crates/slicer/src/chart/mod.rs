@@ -90,6 +90,15 @@ impl Chart {
         carry::image_of(region, |p| self.seen_from_above(p))
     }
 
+    /// Returns the region of the chart that is seen along the axis as `region`.
+    #[must_use]
+    pub fn region_under(&self, region: &Region) -> Region {
+        if self.is_flat() {
+            return region.clone();
+        }
+        carry::image_of(region, |p| self.under(p))
+    }
+
     /// Returns the true length by chart length across the meridian at radius `s`; also true area
     /// by chart area.
     #[must_use]

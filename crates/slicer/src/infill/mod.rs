@@ -18,6 +18,7 @@ mod monotonic;
 mod rectilinear;
 mod sparse;
 mod spiral;
+pub(crate) mod support;
 
 use geom::region::{Island, Region};
 use geom::simplify::simplify_line;

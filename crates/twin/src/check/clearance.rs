@@ -327,7 +327,15 @@ mod tests {
     /// A bead of 0.45 mm from one place to another.
     fn bead(ends: [[f64; 3]; 2], family: Family) -> Piece {
         let ends = ends.map(Point3::from);
-        Piece { ends, half_width: 0.225, thickness: 0.2, family, layer: 3, stroke: 0 }
+        Piece {
+            ends,
+            half_width: 0.225,
+            thickness: 0.2,
+            family,
+            layer: 3,
+            stroke: 0,
+            supports: false,
+        }
     }
 
     /// What is found with the tip at `tip`, the rail along `rail`, after `piece` was laid; and the depth.

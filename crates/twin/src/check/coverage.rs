@@ -100,7 +100,8 @@ mod tests {
                     resting: 25 + own - open,
                     ..Footing::default()
                 };
-                let step = Step { line, layer: None, ends, footing, is_inside: true };
+                let step =
+                    Step { line, layer: None, ends, footing, is_inside: true, is_support: false };
                 let opening = Opening { below: Point3::origin(), depth: 0.2, is_new: true };
                 check.piece(&step, &vec![opening; open as usize], 0.2);
             }
@@ -118,7 +119,8 @@ mod tests {
             let mut check = Hollow::default();
             let footing = Footing { covered: 20, resting: 12, lacking, ..Footing::default() };
             let ends = [Point3::origin(), Point3::new(0.5, 0.0, 0.0)];
-            let step = Step { line: 1, layer: None, ends, footing, is_inside: true };
+            let step =
+                Step { line: 1, layer: None, ends, footing, is_inside: true, is_support: false };
             let opening = Opening { below: Point3::origin(), depth: 0.13, is_new: true };
             check.piece(&step, &[opening; 8], 0.2);
             check.sum()

@@ -74,6 +74,7 @@ mod tests {
                     ends: [at(k), at(k + 1)],
                     footing,
                     is_inside: false,
+                    is_support: false,
                 };
                 check.piece(&step, &mut findings);
             }

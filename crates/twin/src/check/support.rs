@@ -4,7 +4,7 @@
 //! [`LEAST_SHARE`] of its width and length rests on the bed or on earlier layers (see
 //! `pile`). Pieces in a row that are not carried are a *gap*:
 //!
-//! * a gap shorter than [`SHORTEST`] is nothing;
+//! * a gap shorter than [`SHORTEST`], of supports than [`SHORTEST_OF_SUPPORTS`], is nothing;
 //! * a gap with carried ends is a bridge: any line over [`BRIDGE_ANY`], a straight one over
 //!   [`BRIDGE`];
 //! * all others hang, and those without a carried begin start in mid-air.
@@ -12,6 +12,8 @@
 //! Where the place below belongs to the part, a gap lies over the openings of sparse infill, and is
 //! summed and not found (whether a part that is meant to be solid has holes is for
 //! [`crate::check::coverage`] to say); without a mesh only walls, skins and gap fill are judged.
+//!
+//! The part rests on supports, and these on the part, over the gap that parts them, too.
 //!
 //! A closed line has no begin: what is open at both its ends is one gap. mm, part frame.
 
@@ -32,6 +34,10 @@ pub const LEAST_SHARE: f64 = 1.0 / 3.0;
 
 /// Shorter gaps are nothing, mm: two beads' width, which the bead spans by its own stiffness.
 pub const SHORTEST: f64 = 1.0;
+
+/// The same for supports, mm: what of their dense layers reaches beyond the lines of a column, which
+/// are so far apart, sags by a fraction of a bead and carries all the same.
+pub const SHORTEST_OF_SUPPORTS: f64 = 3.0;
 
 /// Longest gap that a bead of any shape spans, mm: the openings of sparse infill.
 pub const BRIDGE_ANY: f64 = 5.0;
@@ -73,6 +79,8 @@ pub(crate) struct Step {
     pub(crate) footing: Footing,
     /// Whether the place below belongs to the part.
     pub(crate) is_inside: bool,
+    /// Whether the bead is one of supports itself.
+    pub(crate) is_support: bool,
 }
 
 /// Follows beads from piece to piece.
@@ -94,6 +102,8 @@ struct Gap {
     from: Point3<f64>,
     to: Point3<f64>,
     length: f64,
+    /// Shorter gaps are nothing, mm.
+    shortest: f64,
     /// Whether the pieces before and after are carried.
     anchors: [bool; 2],
 }
@@ -116,7 +126,9 @@ impl Follow {
         }
         let anchors = [self.was_carried, false];
         let place = Place { line: step.line, layer: step.layer, at: Some(from) };
-        let gap = self.gap.get_or_insert(Gap { place, from, to, length: 0.0, anchors });
+        let shortest = if step.is_support { SHORTEST_OF_SUPPORTS } else { SHORTEST };
+        let fresh = Gap { place, from, to, length: 0.0, shortest, anchors };
+        let gap = self.gap.get_or_insert(fresh);
         gap.length += length;
         gap.to = to;
     }
@@ -166,8 +178,8 @@ impl Follow {
     }
 
     fn judge(&mut self, gap: &Gap, findings: &mut Findings) {
-        let Gap { length, anchors, .. } = *gap;
-        if length < SHORTEST {
+        let Gap { length, shortest, anchors, .. } = *gap;
+        if length < shortest {
             return;
         }
         let is_straight = (gap.to - gap.from).norm() >= STRAIGHT * length;
@@ -179,7 +191,7 @@ impl Follow {
         self.sums.hanging += length;
         self.sums.hanging_beads += 1;
         self.sums.in_mid_air += usize::from(!anchors[0]);
-        let limit = if anchors == [true, true] { span } else { SHORTEST };
+        let limit = if anchors == [true, true] { span } else { shortest };
         findings.warning(NAME, gap.place, (length, limit), || match anchors {
             [false, _] => format!("a bead begins in mid-air and hangs for {length:.1} mm"),
             [true, false] => format!("a bead ends in mid-air, {length:.1} mm of it hang"),
@@ -217,6 +229,7 @@ mod tests {
                 ends,
                 footing: footing(c == '='),
                 is_inside: c == 'i',
+                is_support: false,
             };
             follow.piece(&step, &mut findings);
         }

@@ -1,0 +1,298 @@
+//! Supports: columns under what no layer surface carries.
+//!
+//! What of a layer hangs over is judged on the layer itself ([`hanging`]): its overhang beyond the
+//! layer below, taken along the normal, and not its angle to the vertical. From there supports go
+//! straight down, as weight does, through all layers below, whatever surface these follow; so they
+//! are known as they are seen along the axis ([`Shade`]). Where they meet the part they end on it, or,
+//! if only the bed may carry them, they are left out from the top down ([`columns`]).
+//!
+//! Supports keep a gap to the part: aside `xy_gap` mm, and above and below as many whole layers as
+//! it takes to be at least `top_gap` and `bottom_gap` mm. The layers of a column next to the part
+//! are its *interface*, which is filled more densely.
+
+use geom::region::{Fill, Island, Region};
+use nalgebra::Point2;
+use rayon::prelude::*;
+
+use crate::bridge::spanned;
+use crate::chart::Chart;
+
+/// How the lines of a column run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SupportPattern {
+    /// Parallel lines, the same in every layer: walls.
+    Rectilinear,
+    /// Parallel lines, turned by 90° from layer to layer.
+    RectilinearGrid,
+    /// Hexagonal cells.
+    Honeycomb,
+}
+
+/// How parts are supported.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SupportParams {
+    /// Slopes are supported that rise from the layer by less than this, radians; 0 for those where
+    /// a layer reaches beyond the one below by more than half a bead.
+    pub threshold: f64,
+    /// Width of the outermost bead of the part, mm.
+    pub wall_width: f64,
+    /// Whether supports stand on the bed only, and never on the part.
+    pub on_bed_only: bool,
+    /// Whether gaps are left to bridges where a line of at most this length (mm) spans them; 0 for
+    /// none.
+    pub longest_bridge: f64,
+    /// Distance from the part aside, mm.
+    pub xy_gap: f64,
+    /// Least distance from the part above a column, mm.
+    pub top_gap: f64,
+    /// Least distance from the part that a column stands on, mm.
+    pub bottom_gap: f64,
+    /// Layers of interface under the part.
+    pub top_interface: usize,
+    /// Layers of interface on the part.
+    pub bottom_interface: usize,
+    /// Width of the beads, mm.
+    pub width: f64,
+    /// Space between the lines of a column, mm.
+    pub spacing: f64,
+    /// Space between the lines of the interface, mm.
+    pub interface_spacing: f64,
+    /// Direction of the lines of a column, radians from the part's reference azimuth.
+    pub angle: f64,
+    /// How lines of a column run.
+    pub pattern: SupportPattern,
+    /// Whether a loop runs around columns.
+    pub sheath: bool,
+    /// No bead reaches farther from the rotation axis, mm.
+    pub reach: f64,
+}
+
+/// How far columns reach beyond what hangs over, mm: an edge is as well carried as the middle, and no
+/// column is so slender that it falls.
+pub const MARGIN_MM: f64 = 1.0;
+
+/// Slimmer strips than this are noise of outlines, mm.
+const NOISE_MM: f64 = 0.02;
+
+/// Smaller places than this carry themselves, mm²: a bead's dot is as large. Islands that begin in
+/// mid-air are supported however small.
+const LEAST_MM2: f64 = 0.15;
+
+/// How closely columns follow outlines, mm.
+const TOLERANCE_MM: f64 = 0.05;
+
+impl SupportParams {
+    /// Returns how far a layer of this thickness may reach beyond the one below, mm.
+    #[must_use]
+    pub fn carried_reach(&self, thickness: f64) -> f64 {
+        if self.threshold > 0.0 { thickness / self.threshold.tan() } else { self.wall_width / 2.0 }
+    }
+}
+
+/// Returns what of a layer must be supported, in its chart. `below` is the layer below, carried to it
+/// along the normals.
+#[must_use]
+pub fn hanging(
+    material: &Region,
+    below: &Region,
+    chart: &Chart,
+    thickness: f64,
+    params: &SupportParams,
+) -> Region {
+    let beyond = material.difference(below);
+    if beyond.area() <= LEAST_MM2 && carries_all(below, material) {
+        return Region::default();
+    }
+    let reach = params.carried_reach(thickness);
+    let bare = chart.opened(&material.difference(&chart.outset(below, reach)), NOISE_MM);
+    let floats =
+        |island: &&Island| Region::from_island((*island).clone()).intersection(below).is_empty();
+    let floating = material.filtered(floats);
+    let mut hangs = Region::default();
+    if !bare.is_empty() {
+        // Up to what carries it, so that the steps of a slope leave no stripes between them.
+        hangs = chart.outset(&bare, reach + NOISE_MM).intersection(&beyond);
+        hangs = hangs.without_small_islands(LEAST_MM2);
+        if params.longest_bridge > 0.0 && !hangs.is_empty() {
+            let (spacing, longest) = (params.wall_width, params.longest_bridge);
+            let spanned = spanned(&hangs, below, chart, spacing, longest);
+            hangs = hangs.difference(&spanned).without_small_islands(LEAST_MM2);
+        }
+    }
+    if floating.is_empty() { hangs } else { hangs.union(&floating) }
+}
+
+/// Whether every island of a layer has something below it.
+fn carries_all(below: &Region, material: &Region) -> bool {
+    material.islands().iter().all(|island| {
+        island.iter().flatten().any(|&p| below.contains(&geom::grid::mm(p)))
+            || !Region::from_island(island.clone()).intersection(below).is_empty()
+    })
+}
+
+/// One layer as it is seen along the axis.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Shade {
+    /// The part.
+    pub material: Region,
+    /// What of it must be supported.
+    pub hanging: Region,
+    /// Thickness of the layer, mm.
+    pub thickness: f64,
+}
+
+/// What of one layer is support, as it is seen along the axis.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Column {
+    /// All of it.
+    pub whole: Region,
+    /// What of it is next to the part.
+    pub interface: Region,
+    /// What of the part in this layer is supported from below.
+    pub carried: Region,
+}
+
+impl Column {
+    /// Returns whether nothing of the layer is support, nor carried by it.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.whole.is_empty() && self.carried.is_empty()
+    }
+}
+
+/// Returns the supports of all layers, which come from the bed up.
+#[must_use]
+pub fn columns(layers: &[Shade], params: &SupportParams) -> Vec<Column> {
+    let contacts = contacts(layers, params);
+    let needed = needed(layers, &contacts);
+    let clear: Vec<Region> = layers
+        .par_iter()
+        .zip(&needed)
+        .map(|(layer, needed)| {
+            if needed.is_empty() { Region::default() } else { layer.material.outset(params.xy_gap) }
+        })
+        .collect();
+    let mut columns: Vec<Column> = (0..layers.len())
+        .into_par_iter()
+        .map(|k| column(k, layers, (&contacts, &needed, &clear[k]), params))
+        .collect();
+    for (column, contact) in columns.iter_mut().zip(contacts) {
+        column.carried = contact;
+    }
+    columns
+}
+
+/// What columns reach up to under each layer: what hangs over, and a little around it.
+fn contacts(layers: &[Shade], params: &SupportParams) -> Vec<Region> {
+    let mut under = Region::default();
+    let mut grounds = Vec::with_capacity(layers.len());
+    for layer in layers {
+        // Over none of this may a column stand that has to reach the bed.
+        let is_asked = params.on_bed_only && !layer.hanging.is_empty();
+        grounds.push(if is_asked { under.outset(params.xy_gap) } else { Region::default() });
+        if params.on_bed_only {
+            under = under.union(&layer.material).thinned(TOLERANCE_MM / 2.0);
+        }
+    }
+    let of = |(k, layer): (usize, &Shade)| {
+        let hangs = layer.hanging.difference(&grounds[k]);
+        if k == 0 || hangs.is_empty() {
+            return Region::default();
+        }
+        let beside = layers[k - 1].material.outset(params.xy_gap).union(&grounds[k]);
+        let grown = hangs.outset(MARGIN_MM).difference(&beside);
+        // Not on the other side of a thin wall.
+        let touches = |island: &&Island| {
+            !Region::from_island((*island).clone()).intersection(&hangs).is_empty()
+        };
+        grown.filtered(touches).union(&hangs)
+    };
+    layers.par_iter().enumerate().map(of).collect()
+}
+
+/// Where columns pass through each layer, but for the gaps.
+fn needed(layers: &[Shade], contacts: &[Region]) -> Vec<Region> {
+    let mut needed = vec![Region::default(); layers.len()];
+    let mut passing = Region::default();
+    for k in (0..layers.len()).rev() {
+        if let Some(contact) = contacts.get(k + 1).filter(|contact| !contact.is_empty()) {
+            passing = passing.union(contact);
+        }
+        if !passing.is_empty() {
+            passing = passing.difference(&layers[k].material).simplified(TOLERANCE_MM / 2.0);
+        }
+        needed[k].clone_from(&passing);
+    }
+    needed
+}
+
+/// The support of layer `k`: `contacts` and where columns are needed in all layers, and where the part
+/// and the gap aside are in this one.
+fn column(
+    k: usize,
+    layers: &[Shade],
+    (contacts, needed, clear): (&[Region], &[Region], &Region),
+    params: &SupportParams,
+) -> Column {
+    if needed[k].is_empty() {
+        return Column::default();
+    }
+    let above = gap(params.top_gap, (k + 1..layers.len()).map(|i| layers[i].thickness));
+    let below = gap(params.bottom_gap, (0..k).rev().map(|i| layers[i].thickness));
+    let mut free = needed[k].difference(clear);
+    for i in (k + 1..=k + above).chain(k - below..k) {
+        free = free.difference(&layers[i].material);
+    }
+    let radius = params.width / 2.0;
+    let reach = disc(params.reach - params.width);
+    let whole = opened(&free.intersection(&reach), radius);
+    let mut near = Region::default();
+    let first_above = (k + above + 1).min(layers.len());
+    for contact in &contacts[first_above..(first_above + params.top_interface).min(layers.len())] {
+        near = near.union(contact);
+    }
+    // What hangs over within the gap above is carried by interface all around, too.
+    if params.top_interface > 0 {
+        for contact in &contacts[k + 1..first_above] {
+            near = near.union(contact);
+        }
+    }
+    let last_below = k - below;
+    for layer in &layers[last_below - params.bottom_interface.min(last_below)..last_below] {
+        near = near.union(&layer.material);
+    }
+    let interface = opened(&whole.intersection(&near), radius);
+    Column { whole, interface, carried: Region::default() }
+}
+
+/// How many layers it takes to keep a gap, of these thicknesses in their order.
+fn gap(wanted: f64, thicknesses: impl Iterator<Item = f64>) -> usize {
+    /// Rounding of a sum of heights, mm.
+    const SLACK_MM: f64 = 1e-6;
+    let mut left = wanted - SLACK_MM;
+    let mut count = 0;
+    for thickness in thicknesses {
+        if left <= 0.0 {
+            break;
+        }
+        left -= thickness;
+        count += 1;
+    }
+    count
+}
+
+/// The part of a region that a disc of the radius can reach without leaving it.
+fn opened(region: &Region, radius: f64) -> Region {
+    if region.is_empty() { Region::default() } else { Chart::Plane.opened(region, radius) }
+}
+
+/// A disc about the axis, from the inside.
+fn disc(radius: f64) -> Region {
+    const CORNERS: u32 = 256;
+    let corner = |k: u32| {
+        let angle = std::f64::consts::TAU * f64::from(k) / f64::from(CORNERS);
+        Point2::new(radius * angle.cos(), radius * angle.sin())
+    };
+    let ring: Vec<Point2<f64>> = (0..CORNERS).map(corner).collect();
+    Region::from_rings([ring.as_slice()], Fill::NonZero)
+}
