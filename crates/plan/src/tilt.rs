@@ -8,7 +8,7 @@
 //! neighbouring beads are laid alike, and it is even along a layer; how fast the drives can follow is
 //! the business of the law of [`speed`](crate::speed).
 //!
-//! The [`Tilter`] turns legs of the tip into moves of all drives. Those run evenly from end to end of a
+//! The tilter turns legs of the tip into moves of all drives. Those run evenly from end to end of a
 //! move, so the tip leaves the way that an upright nozzle would take; legs are halved until it lies
 //! within half the chord tolerance of it, and the direction within half a degree. What is counted are
 //! stances as the text says them, through the forward kinematics.

@@ -384,8 +384,7 @@ fn layers(
                 printed.count(&filled, &stage.levels[k]);
                 let normal = |p: &Point3<f64>| stage.normal(k, p);
                 let steps = planner.layer_on(&filled.paths, normal).map_err(|error| {
-                    Failure::new("OutOfEnvelope", error.to_string())
-                        .hint("move the part off the axis with --place, or correct the calibration")
+                    Failure::new("OutOfEnvelope", error.to_string()).hint(out_of_reach(job))
                 })?;
                 write(text, &steps)?;
             }
@@ -452,6 +451,15 @@ fn load(
         (Bounds::default(), models::arrange(solids, arrangement, &job.orient)?)
     };
     Ok(Loaded { given, placed, overlap, health, read_ms, repair_ms })
+}
+
+/// What helps where the machine cannot get to a place of a layer.
+fn out_of_reach(job: &Job) -> &'static str {
+    if job.printer.head.is_some() {
+        return "tilt less (--set tilt=needed, tilt_max_deg), move the part with --place, or correct the \
+                ranges of the head in the printer profile";
+    }
+    "move the part off the axis with --place, or correct the calibration"
 }
 
 /// How a program says which surface the following layers lie on.

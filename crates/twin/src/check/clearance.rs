@@ -312,6 +312,11 @@ impl Standing<'_> {
             return f64::INFINITY;
         } else {
             height = height.max(plane(-high / sin, cos / sin));
+            // Behind the axis it ends above, too.
+            let ceiling = (x * cos + high + radius * cos) / sin;
+            if height > ceiling {
+                return f64::INFINITY;
+            }
         }
         height + self.raised * cos
     }
