@@ -116,6 +116,8 @@ pub fn hanging(
         if params.longest_bridge > 0.0 && !hangs.is_empty() {
             let (spacing, longest) = (params.wall_width, params.longest_bridge);
             let spanned = spanned(&hangs, below, chart, spacing, longest);
+            // Beside the outermost lines are the walls, which go the same way.
+            let spanned = chart.outset(&spanned, spacing);
             hangs = hangs.difference(&spanned).without_small_islands(LEAST_MM2);
         }
     }

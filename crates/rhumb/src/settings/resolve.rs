@@ -375,10 +375,10 @@ fn check_vase(get: &Lookup<'_>) -> Result<(), Failure> {
         return Ok(());
     }
     if get.switch("support_material") {
-        return Err(conflict(
-            "spiral_vase is one line without supports",
-            "support_material = true",
-        ));
+        return Err(conflict("spiral_vase has no supports", "support_material = true"));
+    }
+    if kind == "conical" && get.text("blend") == "morph" {
+        return Err(conflict("spiral_vase climbs on layers that are all alike", "blend = morph"));
     }
     if ["planar", "conical", "caps"].contains(&kind) {
         return Ok(());
@@ -790,6 +790,8 @@ mod tests {
         assert_eq!(class(&["home_z_mm=300"]), "ConfigConflict");
         assert_eq!(class(&["z_increment_mm=0.35"]), "ConfigConflict");
         assert!(resolve(&["z_increment_mm=0.35", "snap=off"]).is_ok());
+        let vase = ["spiral_vase=true", "layers=conical", "blend=morph"];
+        assert_eq!(class(&vase), "ConfigConflict");
         assert_eq!(class(&["start_gcode=M109 S{no}"]), "ConfigUnknownKey");
         assert!(resolve(&["fill_density=100%"]).unwrap().paths.skins.all_solid);
     }
