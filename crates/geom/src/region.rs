@@ -14,7 +14,7 @@ use i_overlay::core::overlay_rule::OverlayRule;
 use nalgebra::Point2;
 
 use crate::boolean::{self, Side};
-use crate::grid::{GridPoint, STEPS_PER_MM, mm, snap};
+use crate::grid::{GridPoint, STEPS_PER_MM, mm, snap, steps};
 use crate::simplify::simplify_ring;
 
 /// One closed ring; the last point is joined to the first.
@@ -140,14 +140,7 @@ impl Region {
     /// Returns the bounding box; `None` when empty.
     #[must_use]
     pub fn bounds(&self) -> Option<GridBounds> {
-        let mut points = self.islands.iter().filter_map(|island| island.first()).flatten();
-        let first = *points.next()?;
-        let mut bounds = GridBounds { min: first, max: first };
-        for p in points {
-            bounds.min = GridPoint::new(bounds.min.x.min(p.x), bounds.min.y.min(p.y));
-            bounds.max = GridPoint::new(bounds.max.x.max(p.x), bounds.max.y.max(p.y));
-        }
-        Some(bounds)
+        bounds_of(self.islands.iter().filter_map(|island| island.first()).flatten())
     }
 
     /// Returns what lies in either region.
@@ -207,6 +200,20 @@ impl Region {
         };
         let islands = self.islands.iter().map(thin).filter(|island| !island.is_empty());
         Self { islands: islands.collect() }
+    }
+
+    /// Returns the islands whose boxes come within `reach` (mm) of a box.
+    #[must_use]
+    pub fn near(&self, around: &GridBounds, reach: f64) -> Self {
+        let reach = steps(reach);
+        self.filtered(|island| {
+            let Some(bounds) = bounds_of(island.iter().take(1).flatten()) else { return false };
+            let apart = |low: i32, high: i32| i64::from(low) - i64::from(high) > i64::from(reach);
+            !(apart(bounds.min.x, around.max.x)
+                || apart(around.min.x, bounds.max.x)
+                || apart(bounds.min.y, around.max.y)
+                || apart(around.min.y, bounds.max.y))
+        })
     }
 
     /// Returns the islands that `keep` accepts.
@@ -318,6 +325,16 @@ impl Region {
         let (Some(a), Some(b)) = (self.bounds(), other.bounds()) else { return false };
         a.min.x <= b.max.x && b.min.x <= a.max.x && a.min.y <= b.max.y && b.min.y <= a.max.y
     }
+}
+
+fn bounds_of<'a>(mut points: impl Iterator<Item = &'a GridPoint>) -> Option<GridBounds> {
+    let first = *points.next()?;
+    let mut bounds = GridBounds { min: first, max: first };
+    for p in points {
+        bounds.min = GridPoint::new(bounds.min.x.min(p.x), bounds.min.y.min(p.y));
+        bounds.max = GridPoint::new(bounds.max.x.max(p.x), bounds.max.y.max(p.y));
+    }
+    Some(bounds)
 }
 
 fn engine_rule(fill: Fill) -> FillRule {

@@ -1,5 +1,7 @@
 //! One layer put together: from its section to toolpaths in the part frame.
 
+use std::borrow::Cow;
+
 use geom::grid::{GridPoint, mm};
 use geom::region::{Fill, Island, Region};
 use nalgebra::{Point2, Point3};
@@ -223,6 +225,23 @@ fn box_around(island: &Island) -> Option<[GridPoint; 2]> {
     Some(outer.iter().fold([first; 2], grown))
 }
 
+/// What of the neighbours can matter to an island: bridges rest on what is near. Layers of few islands
+/// are taken whole; those of thousands would cost their square.
+fn near<'a>(outline: &Region, regions: &[&'a Region]) -> Vec<Cow<'a, Region>> {
+    let Some(bounds) = outline.bounds() else { return Vec::new() };
+    let part = |region: &&'a Region| match region.islands().len() {
+        0..=FEW_ISLANDS => Cow::Borrowed(*region),
+        _ => Cow::Owned(region.near(&bounds, NEAR_MM)),
+    };
+    regions.iter().map(part).collect()
+}
+
+/// How many islands a neighbouring layer may have without being looked through for those that are near.
+const FEW_ISLANDS: usize = 16;
+
+/// How far from its box an island looks, mm: many times further than beads and anchors of bridges reach.
+const NEAR_MM: f64 = 10.0;
+
 fn fill_island(
     island: &Island,
     neighbours: &Neighbours<'_>,
@@ -230,6 +249,9 @@ fn fill_island(
     params: &PathParams,
 ) -> (IslandPaths, LostArea) {
     let outline = Region::from_island(island.clone());
+    let [above, below] = [&neighbours.above, &neighbours.below].map(|all| near(&outline, all));
+    let [above, below] = [&above, &below].map(|all| all.iter().map(AsRef::as_ref).collect());
+    let neighbours = &Neighbours { above, below };
     let Frame { chart, thickness, .. } = *frame;
     let below = neighbours.below.first().copied().filter(|_| frame.lift.level.index > 0);
     let hanging = Below::new(&outline, below, &chart, params.walls.external_width);
