@@ -6,13 +6,19 @@
 
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Longest wait for a connection.
 const CONNECT: Duration = Duration::from_secs(10);
 
 /// Longest silence of a server: after an upload some of them first read the whole file.
 const SILENCE: Duration = Duration::from_secs(120);
+
+/// How long the answer to a question may take as a whole.
+const QUESTION: Duration = Duration::from_secs(15);
+
+/// The same where a server has something to do with what it got: print servers read whole programs.
+const WORK: Duration = Duration::from_secs(120);
 
 /// Longest answer that is read, bytes: a list of some ten thousand files.
 const LONGEST_ANSWER: u64 = 16 << 20;
@@ -196,7 +202,8 @@ pub fn ask(
         return Err(Silence::Body(error));
     }
     // Whoever closes early has said why.
-    match (answer(BufReader::new(stream)), sent) {
+    let patience = if body.is_some() { WORK } else { QUESTION };
+    match (answer(BufReader::new(Patient::new(stream, patience))), sent) {
         (Ok(answer), _) => Ok(answer),
         (Err(_), Err(broken)) => Err(broken),
         (Err(silence), Ok(())) => Err(silence),
@@ -217,6 +224,45 @@ fn send(stream: &mut TcpStream, body: &mut Body<'_>) -> Result<(), Silence> {
         left -= count as u64;
     }
     stream.flush().map_err(Silence::Broken)
+}
+
+/// Reads an answer as long as patience lasts, however slowly it drips, and no more than anybody needs.
+struct Patient {
+    stream: TcpStream,
+    patience: Duration,
+    until: Instant,
+    left: u64,
+}
+
+impl Patient {
+    fn new(stream: TcpStream, patience: Duration) -> Self {
+        let until = Instant::now() + patience;
+        // Heads are small beside bodies.
+        Self { stream, patience, until, left: 2 * LONGEST_ANSWER }
+    }
+}
+
+impl Read for Patient {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let late = || {
+            let said = format!("no whole answer came within {} s", self.patience.as_secs());
+            io::Error::new(io::ErrorKind::TimedOut, said)
+        };
+        let left = self.until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(late());
+        }
+        if self.left == 0 {
+            return Err(io::Error::new(io::ErrorKind::InvalidData, "the answer never ends"));
+        }
+        self.stream.set_read_timeout(Some(left))?;
+        let count = self.stream.read(into).map_err(|error| match error.kind() {
+            io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => late(),
+            _ => error,
+        })?;
+        self.left = self.left.saturating_sub(count as u64);
+        Ok(count)
+    }
 }
 
 /// How a body ends.

@@ -113,8 +113,8 @@ pub fn convert(
     thread::scope(|scope| {
         let (to_plan, batches_read) = sync_channel(BATCHES_AHEAD);
         let (to_write, batches_planned) = sync_channel(BATCHES_AHEAD);
-        scope.spawn(move || read(&mut batches, &to_plan, interrupt));
-        scope.spawn(move || planning.run(&batches_read, &to_write));
+        start(scope, move || read(&mut batches, &to_plan, interrupt))?;
+        start(scope, move || planning.run(&batches_read, &to_write))?;
         for planned in batches_planned {
             writing.batch(planned?)?;
         }
@@ -136,12 +136,22 @@ pub fn convert_checked(
     thread::scope(|scope| {
         let (sender, receiver) = sync_channel(BATCHES_AHEAD);
         let job = request.job;
-        let verdict = scope.spawn(move || check(Chunks::new(receiver), job, None, false, |_| {}));
+        let verdict = start(scope, move || check(Chunks::new(receiver), job, None, false, |_| {}))?;
         let mut tee = Tee::new(out, sender);
         let converted = convert(request, source, &mut tee, interrupt);
         drop(tee);
         let verdict = verdict.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         Ok((converted?, verdict?))
+    })
+}
+
+/// Starts a thread; a system may allow no more of them.
+fn start<'scope, T: Send + 'scope>(
+    scope: &'scope thread::Scope<'scope, '_>,
+    work: impl FnOnce() -> T + Send + 'scope,
+) -> Result<thread::ScopedJoinHandle<'scope, T>, Failure> {
+    thread::Builder::new().spawn_scoped(scope, work).map_err(|error| {
+        Failure::new("LimitExceeded", format!("the system starts no more threads: {error}"))
     })
 }
 
