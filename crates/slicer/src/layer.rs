@@ -251,7 +251,7 @@ fn fill_island(
     let outline = Region::from_island(island.clone());
     let [above, below] = [&neighbours.above, &neighbours.below].map(|all| near(&outline, all));
     let [above, below] = [&above, &below].map(|all| all.iter().map(AsRef::as_ref).collect());
-    let neighbours = &Neighbours { above, below };
+    let neighbours = &Neighbours { above, below, support: neighbours.support };
     let Frame { chart, thickness, .. } = *frame;
     let below = neighbours.below.first().copied().filter(|_| frame.lift.level.index > 0);
     let hanging = Below::new(&outline, below, &chart, params.walls.external_width);
