@@ -217,24 +217,7 @@ pub fn text(
     for warning in &report.warnings {
         row("note", format!("{} [{}]", warning.message, warning.code));
     }
-    match verdict {
-        None => row("check", "left out on request".into()),
-        Some(verdict) if verdict.findings.is_empty() => row(
-            "check",
-            format!(
-                "{} moves read back and replayed: nothing to complain of",
-                verdict.totals.moves
-            ),
-        ),
-        Some(verdict) => {
-            for finding in &verdict.findings {
-                row("check", finding.to_string());
-            }
-            for omitted in &verdict.omitted {
-                row("check", omitted.to_string());
-            }
-        }
-    }
+    judged(verdict).into_iter().for_each(|text| row("check", text));
     if verbose {
         let t = &report.timings_ms;
         row(
@@ -248,6 +231,17 @@ pub fn text(
     }
     row("written", target.to_owned());
     out
+}
+
+/// What the self-check says.
+fn judged(verdict: Option<&Verdict>) -> Vec<String> {
+    let Some(verdict) = verdict else { return vec!["left out on request".into()] };
+    if verdict.findings.is_empty() {
+        let moves = verdict.totals.moves;
+        return vec![format!("{moves} moves read back and replayed: nothing to complain of")];
+    }
+    let findings = verdict.findings.iter().map(ToString::to_string);
+    findings.chain(verdict.omitted.iter().map(ToString::to_string)).collect()
 }
 
 /// The heights of the layers above the first, and the first where it is another.

@@ -51,7 +51,7 @@ pub(super) fn order(command: &str) -> Order {
 
 /// Where the letter and number of a command end; names end with the first blank.
 fn code_end(command: &str) -> usize {
-    let is_name = command.bytes().nth(1).is_some_and(|byte| !byte.is_ascii_digit());
+    let is_name = command.as_bytes().get(1).is_some_and(|byte| !byte.is_ascii_digit());
     let number = |c: char| c.is_ascii_digit() || c == '.';
     let rest = command.char_indices().skip(1);
     rest.filter(|(_, c)| if is_name { c.is_whitespace() } else { !number(*c) })
