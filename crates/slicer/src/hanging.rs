@@ -16,7 +16,7 @@ pub(crate) type Hanging = (Point2<f64>, Bead, Overhang);
 
 /// What is below a layer, as beads of one width feel it.
 pub(crate) struct Below {
-    /// For each degree but the least. Empty where no bead of the island hangs over at all.
+    /// For each degree but the least. Empty where no bead of the layer hangs over at all.
     carries: Vec<Ground>,
 }
 
@@ -42,13 +42,19 @@ const MOST: f64 = 0.25;
 const WHOLE: f64 = 0.5;
 
 impl Below {
-    /// `outline` is the island whose walls are judged, `below` the layer that it lies on (`None` for
-    /// the bed), `width` that of the beads, mm.
-    pub(crate) fn new(outline: &Region, below: Option<&Region>, chart: &Chart, width: f64) -> Self {
+    /// `material` is the layer whose walls are judged, all islands at once, since each would look at all
+    /// that is below; `below` the layer that it lies on (`None` for the bed), `width` that of the beads,
+    /// mm.
+    pub(crate) fn new(
+        material: &Region,
+        below: Option<&Region>,
+        chart: &Chart,
+        width: f64,
+    ) -> Self {
         let grown = |shares: f64, from: &Region| chart.outset(from, shares * width);
         let mut carries = Vec::new();
         let Some(below) = below else { return Self { carries } };
-        let bare = outline.difference(below);
+        let bare = material.difference(below);
         if bare.is_empty() {
             return Self { carries };
         }

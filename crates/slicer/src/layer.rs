@@ -82,12 +82,14 @@ pub fn fill_layer(
     if params.vase && is_above_the_bottom(lift, material, params) {
         return vase_layer(material, &frame, params);
     }
+    let level = &lift.level;
+    let below = neighbours.below.first().copied().filter(|_| level.index > 0);
+    let hanging = Below::new(material, below, &frame.chart, params.walls.external_width);
     let islands: Vec<(IslandPaths, LostArea)> = material
         .islands()
         .par_iter()
-        .map(|island| fill_island(island, neighbours, &frame, params))
+        .map(|island| fill_island(island, &hanging, neighbours, &frame, params))
         .collect();
-    let level = &lift.level;
     let mut filled = Filled {
         paths: LayerPaths {
             index: level.index,
@@ -244,6 +246,7 @@ const NEAR_MM: f64 = 10.0;
 
 fn fill_island(
     island: &Island,
+    hanging: &Below,
     neighbours: &Neighbours<'_>,
     frame: &Frame<'_>,
     params: &PathParams,
@@ -254,8 +257,7 @@ fn fill_island(
     let neighbours = &Neighbours { above, below, support: neighbours.support };
     let Frame { chart, thickness, .. } = *frame;
     let below = neighbours.below.first().copied().filter(|_| frame.lift.level.index > 0);
-    let hanging = Below::new(&outline, below, &chart, params.walls.external_width);
-    let walls = suitable_walls(&outline, &hanging, neighbours, frame, params);
+    let walls = suitable_walls(&outline, hanging, neighbours, frame, params);
     let solid_bead = Bead { width: params.infill.solid_width, thickness };
     let split = split_thin(&walls.interior, &chart, solid_bead.spacing() / 2.0);
     let index = frame.lift.level.index;
