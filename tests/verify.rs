@@ -153,7 +153,8 @@ const DAMAGES: [Damage; 9] = [
     }),
     ("speed", |lines| {
         let at = middle_wall(lines);
-        lines[at].push_str(" F60000");
+        let without: Vec<&str> = lines[at].split(' ').filter(|w| !w.starts_with('F')).collect();
+        lines[at] = without.join(" ") + " F60000";
     }),
     ("continuity", |lines| {
         let at = lines.iter().position(|line| line.starts_with("G1 E-")).unwrap();

@@ -104,7 +104,7 @@ pub fn hanging(
         return Region::default();
     }
     let reach = params.carried_reach(thickness);
-    let bare = chart.opened(&material.difference(&chart.outset(below, reach)), NOISE_MM);
+    let bare = chart.opened(&material.difference(&chart.outset(below, reach)), NOISE_MM / 2.0);
     let floats =
         |island: &&Island| Region::from_island((*island).clone()).intersection(below).is_empty();
     let floating = material.filtered(floats);
@@ -241,7 +241,9 @@ fn column(
     }
     let above = gap(params.top_gap, (k + 1..layers.len()).map(|i| layers[i].thickness));
     let below = gap(params.bottom_gap, (0..k).rev().map(|i| layers[i].thickness));
-    let mut free = needed[k].difference(clear);
+    // What reaches up beyond the gap; the margin around what hangs over ends with the rest.
+    let Some(passing) = needed.get(k + above) else { return Column::default() };
+    let mut free = passing.difference(clear);
     for i in (k + 1..=k + above).chain(k - below..k) {
         free = free.difference(&layers[i].material);
     }
@@ -252,12 +254,6 @@ fn column(
     let first_above = (k + above + 1).min(layers.len());
     for contact in &contacts[first_above..(first_above + params.top_interface).min(layers.len())] {
         near = near.union(contact);
-    }
-    // What hangs over within the gap above is carried by interface all around, too.
-    if params.top_interface > 0 {
-        for contact in &contacts[k + 1..first_above] {
-            near = near.union(contact);
-        }
     }
     let last_below = k - below;
     for layer in &layers[last_below - params.bottom_interface.min(last_below)..last_below] {
