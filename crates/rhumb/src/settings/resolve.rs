@@ -128,7 +128,7 @@ impl Job {
             .map_err(|error| Failure::new("ConfigConflict", error.to_string()))?;
         check_printer(&printer)?;
         check_layers(&get)?;
-        check_vase(&get)?;
+        check_surface(&get)?;
         Ok(Self {
             orient: OrientParams {
                 class_tolerance_rad: get.number("flat_angle_deg").to_radians(),
@@ -368,9 +368,12 @@ fn check_layers(get: &Lookup<'_>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Turns of a vase go over into each other where layers are alike.
-fn check_vase(get: &Lookup<'_>) -> Result<(), Failure> {
+/// What goes with cones alone; and turns of a vase go over into each other where layers are alike.
+fn check_surface(get: &Lookup<'_>) -> Result<(), Failure> {
     let kind = get.text("layers");
+    if get.text("blend") == "morph" && ["spherical", "caps"].contains(&kind) {
+        return Err(conflict("blend = morph is for conical layers", kind));
+    }
     if !get.switch("spiral_vase") {
         return Ok(());
     }
@@ -790,8 +793,8 @@ mod tests {
         assert_eq!(class(&["home_z_mm=300"]), "ConfigConflict");
         assert_eq!(class(&["z_increment_mm=0.35"]), "ConfigConflict");
         assert!(resolve(&["z_increment_mm=0.35", "snap=off"]).is_ok());
-        let vase = ["spiral_vase=true", "layers=conical", "blend=morph"];
-        assert_eq!(class(&vase), "ConfigConflict");
+        assert_eq!(class(&["spiral_vase=true", "layers=conical", "blend=morph"]), "ConfigConflict");
+        assert_eq!(class(&["layers=spherical", "blend=morph"]), "ConfigConflict");
         assert_eq!(class(&["start_gcode=M109 S{no}"]), "ConfigUnknownKey");
         assert!(resolve(&["fill_density=100%"]).unwrap().paths.skins.all_solid);
     }
