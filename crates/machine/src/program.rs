@@ -25,6 +25,9 @@ impl BedTurn {
     /// this one.
     #[must_use]
     pub fn nearest(self, azimuth: f64) -> Self {
+        if (self.0 - azimuth).abs() <= std::f64::consts::PI {
+            return Self(azimuth);
+        }
         let whole_turns = ((self.0 - azimuth) / std::f64::consts::TAU).round();
         Self(azimuth + whole_turns * std::f64::consts::TAU)
     }

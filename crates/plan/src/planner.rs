@@ -15,7 +15,7 @@ use crate::helix::Helix;
 use crate::objects::Objects;
 use crate::order::{OrderParams, OrderedLine, order};
 use crate::printed::Printed;
-use crate::resample::{Leg, ResampleParams, Resampler};
+use crate::resample::{FlatLegs, Leg, ResampleParams, Resampler};
 use crate::route::{FilamentParams, Item, Kind, Router, Speeds, Stroke};
 use crate::scarf::{ScarfParams, ScarfPlacement};
 use crate::seam::SeamMemory;
@@ -187,14 +187,19 @@ fn timed(steps: Vec<Step>, from: f64, to: f64) -> Vec<Step> {
     let (mut now, mut told) = (from, f64::NEG_INFINITY);
     let mut with_times = Vec::with_capacity(steps.len() + 1);
     for step in steps {
-        let is_due = matches!(step, Step::Layer(_)) || now - told >= TOLD_EVERY_S;
-        let after = is_due.then_some(Step::Elapsed(now));
-        told = if is_due { now } else { told };
-        now += planned(&step) * scale;
         // What belongs to a layer stands behind its begin.
         let is_begin = matches!(step, Step::Layer(_));
-        let (before, after) = if is_begin { (None, after) } else { (after, None) };
-        with_times.extend(before.into_iter().chain([step]).chain(after));
+        let elapsed = now;
+        now += planned(&step) * scale;
+        let is_due = is_begin || elapsed - told >= TOLD_EVERY_S;
+        if is_due && !is_begin {
+            with_times.push(Step::Elapsed(elapsed));
+        }
+        with_times.push(step);
+        if is_begin {
+            with_times.push(Step::Elapsed(elapsed));
+        }
+        told = if is_due { elapsed } else { told };
     }
     with_times
 }
@@ -387,9 +392,16 @@ impl<'a> Planner<'a> {
             let at = self.printer.alignment.part_from_joints(&to);
             let speed = self.params.speeds.travel;
             let leg = Leg { kind: Kind::Travel, to, at, filament: 0.0, path, speed };
-            let gentle = [self.params.accelerations.of_travel()];
-            let timed = self.timed(vec![vec![leg]], from, &gentle).map_err(fail)?;
-            steps.extend(timed.into_iter().flatten());
+            let gentle = self.params.accelerations.of_travel();
+            let legs = FlatLegs { legs: vec![leg], counts: vec![1] };
+            let Timed { moves, accelerations, .. } =
+                self.timed(legs, from, vec![gentle]).map_err(fail)?;
+            for (step, wanted) in moves.into_iter().zip(accelerations) {
+                if self.params.accelerations.are_wanted() {
+                    self.tell(wanted, &mut steps);
+                }
+                steps.push(step);
+            }
         }
         let residual = self.tilter.as_ref().map_or(0.0, Tilter::residual);
         Ok((steps, Totals { slow_flow: self.flow.found(), residual, ..self.totals }))
@@ -461,37 +473,56 @@ impl<'a> Planner<'a> {
             })
             .collect();
         let start = self.resampler.joints();
-        let legs = self.resampler.legs(&strokes)?;
-        let mut moves = self.timed_by_role(legs, start, &items)?.into_iter();
-        let mut steps = Vec::new();
+        let legs = self.resampler.flat_legs(&strokes).map_err(|(_, unreachable)| unreachable)?;
+        let Timed { counts, moves, accelerations } = self.timed_by_role(legs, start, &items)?;
+        let mut steps = Vec::with_capacity(items.len() + moves.len());
+        let tells = self.params.accelerations.are_wanted();
+        let mut moves = moves.into_iter().zip(accelerations);
+        let mut counts = counts.into_iter();
         for item in items {
             match item {
                 Item::Step(step) => steps.push(step),
                 Item::Hangs(_) => {}
-                Item::Stroke(_) => steps.extend(moves.next().into_iter().flatten()),
+                Item::Stroke(_) => {
+                    for (step, wanted) in moves.by_ref().take(counts.next().unwrap_or(0)) {
+                        if tells {
+                            self.tell(wanted, &mut steps);
+                        }
+                        steps.push(step);
+                    }
+                }
             }
         }
         Ok(steps)
     }
 
+    /// Says how fast the nozzle may be sped up from here on, where that is not still the same.
+    fn tell(&mut self, wanted: f64, steps: &mut Vec<Step>) {
+        let wanted = wanted.min(self.printer.path_acceleration);
+        if wanted != self.acceleration {
+            steps.push(Step::Acceleration(wanted));
+            self.acceleration = wanted;
+        }
+    }
+
     /// Like [`timed`](Self::timed), with the volume counted by role.
     fn timed_by_role(
         &mut self,
-        legs: Vec<Vec<Leg>>,
+        legs: FlatLegs,
         start: Joints,
         items: &[Item],
-    ) -> Result<Vec<Vec<Step>>, Unreachable> {
-        let mut groups = legs.iter();
+    ) -> Result<Timed, Unreachable> {
+        let mut rest = legs.legs.iter();
+        let mut counts = legs.counts.iter();
         let wanted = self.params.accelerations;
-        let mut accelerations = Vec::new();
+        let mut accelerations = Vec::with_capacity(legs.legs.len());
         for item in items {
             match item {
                 Item::Step(Step::Bead(role, _)) => self.role = *role,
                 Item::Hangs(_) | Item::Step(_) => {}
                 Item::Stroke(_) => {
-                    let group = groups.next().into_iter().flatten();
                     let mut fed = 0.0;
-                    for leg in group {
+                    for leg in rest.by_ref().take(counts.next().copied().unwrap_or(0)) {
                         let prints = leg.kind == Kind::Print;
                         fed += if prints { leg.filament } else { 0.0 };
                         accelerations.push(if prints {
@@ -506,41 +537,47 @@ impl<'a> Planner<'a> {
                 }
             }
         }
-        self.timed(legs, start, &accelerations)
+        self.timed(legs, start, accelerations)
     }
 
     /// Gives every leg its duration.
     fn timed(
         &mut self,
-        groups: Vec<Vec<Leg>>,
+        FlatLegs { legs, counts }: FlatLegs,
         start: Joints,
-        wanted: &[f64],
-    ) -> Result<Vec<Vec<Step>>, Unreachable> {
+        accelerations: Vec<f64>,
+    ) -> Result<Timed, Unreachable> {
         let Some(tilter) = &mut self.tilter else {
-            let (sizes, legs) = flattened(groups);
             let travels = travels(&legs, start);
             let law = |legs: &[Leg], pace: Pace, limits: &Limits| {
-                gentle_durations(legs, &travels, pace, limits, wanted)
+                gentle_durations(legs, &travels, pace, limits, &accelerations)
             };
-            let moves = self.timed_by(legs, &travels, start, wanted, law);
-            return Ok(self.grouped(&sizes, moves.into_iter().map(Step::Move), wanted));
+            let (legs, times) = self.timed_by(legs, &travels, start, &accelerations, law);
+            let moves = legs.iter().zip(times).map(|(leg, time)| Step::Move(planned(leg, time)));
+            return Ok(Timed { counts, moves: moves.collect(), accelerations });
         };
         let from = tilter.stance();
+        let mut legs = legs.into_iter();
+        let groups = counts.iter().map(|&count| legs.by_ref().take(count).collect()).collect();
         let PosedLegs { groups, stances, swings, origins } = tilter.legs(groups)?;
-        let wanted: Vec<f64> = origins.iter().filter_map(|&k| wanted.get(k).copied()).collect();
-        let (sizes, legs) = flattened(groups);
+        let accelerations: Vec<f64> =
+            origins.iter().filter_map(|&k| accelerations.get(k).copied()).collect();
+        let counts = groups.iter().map(Vec::len).collect();
+        let legs: Vec<Leg> = groups.into_iter().flatten().collect();
         let travels = travels(&legs, start);
         let law = |legs: &[Leg], pace: Pace, limits: &Limits| {
-            posed_durations(legs, (&from, &stances), pace, limits, &wanted)
+            posed_durations(legs, (&from, &stances), pace, limits, &accelerations)
         };
-        let moves = self.timed_by(legs, &travels, start, &wanted, law);
-        let steps = moves.into_iter().zip(stances.iter().zip(&swings)).map(
-            |(motion, (&stance, &swing))| Step::Posed(Box::new(Posed { motion, stance, swing })),
-        );
-        Ok(self.grouped(&sizes, steps, &wanted))
+        let (legs, times) = self.timed_by(legs, &travels, start, &accelerations, law);
+        let motions = legs.iter().zip(times).map(|(leg, time)| planned(leg, time));
+        let moves = motions.zip(stances.iter().zip(&swings)).map(|(motion, (&stance, &swing))| {
+            Step::Posed(Box::new(Posed { motion, stance, swing }))
+        });
+        let moves = moves.collect();
+        Ok(Timed { counts, moves, accelerations })
     }
 
-    /// Gives legs the durations of a law of speed, and counts them.
+    /// Gives legs the durations of a law of speed, s, and counts them.
     fn timed_by(
         &mut self,
         mut legs: Vec<Leg>,
@@ -548,7 +585,7 @@ impl<'a> Planner<'a> {
         start: Joints,
         wanted: &[f64],
         law: impl Fn(&[Leg], Pace, &Limits) -> (Vec<f64>, Pace),
-    ) -> Vec<Move> {
+    ) -> (Vec<Leg>, Vec<f64>) {
         let (mut times, mut pace) = law(&legs, self.pace, &self.limits);
         let least_feed = self.params.filament.least_flow / self.params.filament.area;
         if slow_down(&mut legs, &times, &self.params.cooling, least_feed) {
@@ -564,44 +601,10 @@ impl<'a> Planner<'a> {
         for (leg, travel) in legs.iter().zip(travels) {
             self.count(leg, travel.axes[1]);
         }
-        let moves = legs.iter().zip(times.iter().zip(taken.iter())).map(|(leg, times)| {
-            let (&duration, &taken) = times;
-            let motion =
-                Move { to: leg.to, at: leg.at, filament: leg.filament, path: leg.path, duration };
-            self.flow.look(&Move { duration: taken, ..motion });
-            motion
-        });
-        moves.collect()
-    }
-
-    /// Puts moves into groups of these sizes, with the accelerations that are told.
-    fn grouped(
-        &mut self,
-        sizes: &[usize],
-        mut steps: impl Iterator<Item = Step>,
-        wanted: &[f64],
-    ) -> Vec<Vec<Step>> {
-        let groups: Vec<Vec<Step>> =
-            sizes.iter().map(|&size| steps.by_ref().take(size).collect()).collect();
-        if self.params.accelerations.are_wanted() { self.told(groups, wanted) } else { groups }
-    }
-
-    /// Puts the acceleration before every move that has another than the one before.
-    fn told(&mut self, groups: Vec<Vec<Step>>, wanted: &[f64]) -> Vec<Vec<Step>> {
-        let most = self.printer.path_acceleration;
-        let mut wanted = wanted.iter().map(|wanted| wanted.min(most));
-        let told = |steps: Vec<Step>| {
-            let mut all = Vec::with_capacity(steps.len());
-            for step in steps {
-                if let Some(next) = wanted.next().filter(|next| *next != self.acceleration) {
-                    all.push(Step::Acceleration(next));
-                    self.acceleration = next;
-                }
-                all.push(step);
-            }
-            all
-        };
-        groups.into_iter().map(told).collect()
+        for (leg, &duration) in legs.iter().zip(taken.iter()) {
+            self.flow.look(&planned(leg, duration));
+        }
+        (legs, times)
     }
 
     fn count(&mut self, leg: &Leg, turned: f64) {
@@ -626,8 +629,16 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// All legs in one list, and how many each group had.
-fn flattened(groups: Vec<Vec<Leg>>) -> (Vec<usize>, Vec<Leg>) {
-    let sizes = groups.iter().map(Vec::len).collect();
-    (sizes, groups.into_iter().flatten().collect())
+fn planned(leg: &Leg, duration: f64) -> Move {
+    let Leg { to, at, filament, path, .. } = *leg;
+    Move { to, at, filament, path, duration }
+}
+
+/// Legs as steps that last as long as they should.
+struct Timed {
+    /// How many each stroke has.
+    counts: Vec<usize>,
+    moves: Vec<Step>,
+    /// How fast the nozzle should be sped up in each, mm/s².
+    accelerations: Vec<f64>,
 }

@@ -15,6 +15,7 @@
 
 mod division;
 mod long_move;
+mod sweep;
 
 use machine::gcode::Dialect;
 use machine::gcode::dialect::Space;
@@ -27,6 +28,7 @@ use nalgebra::{Point2, Point3, Rotation2};
 use crate::axis::{Piece, distance_to_axis, keep_clear, outside};
 use crate::route::{Kind, Stroke};
 use crate::winding::{extent, unwinding};
+use sweep::Sweep;
 
 /// How closely moves follow strokes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,6 +131,8 @@ pub struct Resampler {
     /// How far from the axis the far side of the rail reaches, mm; negative when it does not.
     far_reach: f64,
     joints: Joints,
+    /// How the rail then points over the bed.
+    facing: Rotation2<f64>,
     branch: Branch,
     /// Where the nozzle stands over the bed; not always where the last stroke ended.
     over_bed: Point2<f64>,
@@ -167,6 +171,7 @@ impl Resampler {
             most_turn: if reaches_far_side { printer.most_turn } else { f64::INFINITY },
             far_reach: if reaches_far_side { -printer.rail.min } else { f64::NEG_INFINITY },
             joints: printer.home,
+            facing: Rotation2::new(printer.alignment.bed.azimuth(printer.home.turn)),
             branch: Branch::Near,
             over_bed: Point2::from(printer.alignment.over_bed(&at.xy())),
             meant: Point2::from(printer.alignment.over_bed(&at.xy())),
@@ -182,7 +187,9 @@ impl Resampler {
         let joints = printer.home;
         let at_part = self.alignment.part_from_joints(&joints);
         let over_bed = Point2::from(self.alignment.over_bed(&at_part.xy()));
-        Self { joints, branch: Branch::Near, over_bed, meant: over_bed, at_part, ..self.clone() }
+        let facing = Rotation2::new(self.alignment.bed.azimuth(joints.turn));
+        let branch = Branch::Near;
+        Self { joints, facing, branch, over_bed, meant: over_bed, at_part, ..self.clone() }
     }
 
     /// Filament of strokes too short to be moves that is still to be laid, mm.
@@ -477,19 +484,21 @@ impl Resampler {
             return true;
         }
         let unit = along / length;
-        let is_near = |joints: &Joints| {
-            unit.perp(&(self.over_bed_at(joints) - self.over_bed)).abs() <= tolerance
-        };
         // Firmwares that take part coordinates run some moves straight and some, in pieces of their
         // own choice, as the joints do: both ways must be near. The middle is mostly the farthest.
-        let along_joints =
-            |share: f64| is_near(&machine::gcode::dialect::POLAR.between(&self.joints, to, share));
-        let as_written =
-            |share: f64| is_near(&self.params.dialect.between(&self.joints, to, share));
-        const SHARES: [f64; 3] = [0.5, 0.25, 0.75];
-        (self.deviation_bound(to) <= tolerance || SHARES.into_iter().all(along_joints))
-            && (self.params.dialect.space == Space::Joints || SHARES.into_iter().all(as_written))
+        let as_written = |share: f64| {
+            let joints = self.params.dialect.between(&self.joints, to, share);
+            unit.perp(&(self.over_bed_at(&joints) - self.over_bed)).abs() <= tolerance
+        };
+        (self.deviation_bound(to) <= tolerance
+            || self.sweep(to).is_near(&self.over_bed, &unit, tolerance))
+            && (self.params.dialect.space == Space::Joints
+                || [0.5, 0.25, 0.75].into_iter().all(as_written))
             && self.turns_evenly(to, turn)
+    }
+
+    fn sweep(&self, to: &Joints) -> Sweep {
+        Sweep::new(&self.alignment, self.facing, &self.joints, to)
     }
 
     /// No move to `to` that is straight in joint space leaves the line to its end by more than this,
@@ -586,12 +595,14 @@ impl Resampler {
         within(&self.rail, "carriage", to.s)?;
         within(&self.lift, "lift", to.z)?;
         let to = self.as_written(&to);
-        let at = self.alignment.part_from_joints(&to);
+        let facing = Rotation2::new(self.alignment.bed.azimuth(to.turn));
+        let part = self.alignment.part_from_bed(&(facing * self.alignment.nozzle(&to)));
+        let at = Point3::new(part.x, part.y, to.z);
         let path = self.path_length(&to, at);
         if path < LEAST_PATH_MM {
             return Ok(());
         }
-        self.joints = to;
+        (self.joints, self.facing) = (to, facing);
         self.over_bed = target.over_bed;
         self.at_part = at;
         legs.push(Leg { kind, to, at, filament: 0.0, path, speed: 0.0 });

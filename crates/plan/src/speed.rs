@@ -353,22 +353,27 @@ fn keep_accelerations<const N: usize>(
     law: &Law<'_>,
 ) {
     // Pairs of neighbours of which one changed since they were found to agree; most never change.
-    let mut open = vec![true; durations.len().saturating_sub(1)];
+    let count = durations.len().saturating_sub(1);
+    let mut open = Open::all(count);
     for _ in 0..MOST_PASSES {
         let mut changed = join_on(before, durations, moves, law);
-        if let Some(first) = open.first_mut().filter(|_| changed) {
-            *first = true;
+        if changed && count > 0 {
+            open.insert(0);
         }
-        for i in 0..open.len() {
+        let mut place = 0;
+        while let Some(i) = open.next(place) {
             changed |= look_again(i, &mut open, durations, moves, law);
+            place = i + 1;
         }
         let rests = come_to_rest(durations, moves, law);
-        if let Some(last) = open.last_mut().filter(|_| rests) {
-            *last = true;
+        if rests && count > 0 {
+            open.insert(count - 1);
         }
         changed |= rests;
-        for i in (0..open.len()).rev() {
+        let mut place = count;
+        while let Some(i) = open.last_before(place) {
             changed |= look_again(i, &mut open, durations, moves, law);
+            place = i;
         }
         if !changed {
             return;
@@ -379,21 +384,68 @@ fn keep_accelerations<const N: usize>(
 /// Makes moves `i` and `i + 1` agree where need be; returns whether anything changed.
 fn look_again<const N: usize>(
     i: usize,
-    open: &mut [bool],
+    open: &mut Open,
     durations: &mut [f64],
     moves: &[[f64; N]],
     law: &Law<'_>,
 ) -> bool {
-    if !open[i] {
-        return false;
-    }
     let changed = agree(i, durations, moves, law);
-    open[i] = changed;
     if changed {
-        let neighbours = i.saturating_sub(1)..=(i + 1).min(open.len() - 1);
-        open[neighbours].fill(true);
+        for neighbour in i.saturating_sub(1)..=(i + 1).min(open.count - 1) {
+            open.insert(neighbour);
+        }
+    } else {
+        open.remove(i);
     }
     changed
+}
+
+/// A set of numbers below a count; what is in it is found in words of 64.
+struct Open {
+    words: Vec<u64>,
+    count: usize,
+}
+
+impl Open {
+    /// All numbers.
+    fn all(count: usize) -> Self {
+        let mut words = vec![u64::MAX; count.div_ceil(64)];
+        if let Some(last) = words.last_mut().filter(|_| !count.is_multiple_of(64)) {
+            *last = (1 << (count % 64)) - 1;
+        }
+        Self { words, count }
+    }
+
+    fn insert(&mut self, number: usize) {
+        self.words[number / 64] |= 1 << (number % 64);
+    }
+
+    fn remove(&mut self, number: usize) {
+        self.words[number / 64] &= !(1 << (number % 64));
+    }
+
+    /// The least that is at least `from`.
+    fn next(&self, from: usize) -> Option<usize> {
+        let first = from / 64;
+        let of_word = self.words.get(first)? & (u64::MAX << (from % 64));
+        let after = || (first + 1..self.words.len()).find(|&k| self.words[k] != 0);
+        let (k, word) =
+            if of_word != 0 { (first, of_word) } else { after().map(|k| (k, self.words[k]))? };
+        Some(64 * k + word.trailing_zeros() as usize)
+    }
+
+    /// The greatest below `end`.
+    fn last_before(&self, end: usize) -> Option<usize> {
+        let last = end.checked_sub(1)?;
+        let of_word = self.words[last / 64] & (u64::MAX >> (63 - last % 64));
+        let before = || (0..last / 64).rev().find(|&k| self.words[k] != 0);
+        let (k, word) = if of_word != 0 {
+            (last / 64, of_word)
+        } else {
+            before().map(|k| (k, self.words[k]))?
+        };
+        Some(64 * k + 63 - word.leading_zeros() as usize)
+    }
 }
 
 /// Makes the first move agree with what ran before it, which can no longer change.
@@ -493,6 +545,27 @@ mod tests {
     use crate::route::Stroke;
     use crate::testing::printer;
     use nalgebra::Point3;
+
+    #[test]
+    fn open_pairs_are_found_in_both_directions() {
+        for count in [0, 1, 63, 64, 65, 200] {
+            let mut open = Open::all(count);
+            let ahead = |open: &Open| -> Vec<usize> {
+                std::iter::successors(open.next(0), |i| open.next(i + 1)).collect()
+            };
+            let back = |open: &Open| -> Vec<usize> {
+                std::iter::successors(open.last_before(count), |i| open.last_before(*i)).collect()
+            };
+            assert_eq!(ahead(&open), (0..count).collect::<Vec<_>>());
+            assert_eq!(back(&open), (0..count).rev().collect::<Vec<_>>());
+            for i in (0..count).filter(|i| i % 7 != 3) {
+                open.remove(i);
+            }
+            let left: Vec<usize> = (0..count).filter(|i| i % 7 == 3).collect();
+            assert_eq!(ahead(&open), left);
+            assert_eq!(back(&open), left.into_iter().rev().collect::<Vec<_>>());
+        }
+    }
 
     fn planned(points: &[[f64; 2]], speed: f64) -> (Vec<Leg>, Vec<Travel>, Vec<f64>) {
         let printer = printer();

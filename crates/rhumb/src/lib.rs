@@ -42,6 +42,7 @@ pub mod commands;
 pub mod convert;
 pub mod estimate;
 pub mod failure;
+mod filling;
 pub mod groups;
 pub mod http;
 pub mod input;

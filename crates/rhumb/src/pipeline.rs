@@ -1,8 +1,8 @@
 //! The whole slice, from the bytes of a model to the text of a program.
 //!
 //! Layers are worked in windows: the sections and toolpaths of a window in parallel, its plan and
-//! its text in order. Text leaves as soon as a window is planned, so memory holds the mesh and a
-//! window, and the bytes are the same for any number of threads.
+//! its text in order, while the next window is being filled. Text leaves as soon as a window is planned,
+//! so memory holds the mesh and two windows, and the bytes are the same for any number of threads.
 
 use std::io::Write;
 use std::path::Path;
@@ -27,7 +27,8 @@ use twin::picture::thumbnail::Thumbnail;
 
 use crate::choice::{Choice, choose};
 use crate::failure::Failure;
-use crate::groups::{Group, Own, groups, stacks, surround, together};
+use crate::filling::{Batch, Filling};
+use crate::groups::{Group, Own, groups};
 use crate::interrupt::Interrupt;
 use crate::levels::{Layout, check_cuts};
 use crate::models::{self, Arrangement, Model};
@@ -39,7 +40,6 @@ use crate::program_text;
 use crate::progress::Progress;
 use crate::report::{Timings, Warning};
 use crate::settings::{Job, Settings};
-use crate::stack::Stack;
 use crate::stages::{LayerKind, Stage, stages};
 use crate::stopwatch::Stopwatch;
 use crate::supports::supports;
@@ -64,7 +64,7 @@ pub struct Request<'a> {
 pub struct Watch<'a> {
     /// Told what is being done.
     pub progress: &'a mut dyn Progress,
-    /// Asked before every window.
+    /// Asked before every window of layers.
     pub interrupt: &'a Interrupt,
 }
 
@@ -105,7 +105,7 @@ pub struct Outcome {
 /// [`Failure`] with what is wrong with model, settings or output.
 pub fn slice(
     request: &Request<'_>,
-    out: &mut dyn Write,
+    out: &mut (dyn Write + Send),
     watch: &mut Watch<'_>,
 ) -> Result<Outcome, Failure> {
     let name = Path::new(request.name);
@@ -123,7 +123,7 @@ pub fn slice_all(
     request: &Request<'_>,
     models: &[Model<'_>],
     arrangement: &Arrangement,
-    out: &mut dyn Write,
+    out: &mut (dyn Write + Send),
     watch: &mut Watch<'_>,
 ) -> Result<Outcome, Failure> {
     let job = request.job;
@@ -229,7 +229,8 @@ fn time_of(
     let mut job = job.clone();
     job.plan.resample.azimuth = placed.azimuth;
     let mut nobody = std::io::sink();
-    let mut text = Emitter::for_printer(&mut nobody as &mut dyn Write, job.dialect, &job.printer);
+    let mut text =
+        Emitter::for_printer(&mut nobody as &mut (dyn Write + Send), job.dialect, &job.printer);
     let parts = Parts { all: upright, groups: &[], objects: &Objects::default() };
     Ok(layers(&parts, &stages, &job, &mut text, watch)?.totals.time)
 }
@@ -239,7 +240,7 @@ fn start_with_objects(
     placed: &Placed,
     own: &[Own],
     job: &Job,
-    text: &mut Emitter<&mut dyn Write>,
+    text: &mut Emitter<&mut (dyn Write + Send)>,
 ) -> Vec<String> {
     let mut start = job.start.clone();
     for own in own {
@@ -294,10 +295,6 @@ fn placement_warnings(given: &Bounds, placed: &Placed, fit: Fit, job: &Job) -> V
 /// How far above or below z = 0 a model may stand without a word, mm.
 const RECENTRED_MM: f64 = 0.01;
 
-/// Layers that are worked at once. Enough to keep all threads busy; a window of a fine model is a
-/// few megabytes.
-pub(crate) const WINDOW: usize = 64;
-
 /// What the layers amount to.
 #[derive(Default)]
 struct Printed {
@@ -316,10 +313,11 @@ struct Printed {
 }
 
 /// What is sliced, in the frame that turns with the part.
-struct Parts<'a> {
-    all: &'a Solid,
+pub(crate) struct Parts<'a> {
+    /// All models.
+    pub(crate) all: &'a Solid,
     /// By how they are filled, where models differ in that.
-    groups: &'a [Group],
+    pub(crate) groups: &'a [Group],
     objects: &'a Objects,
 }
 
@@ -327,10 +325,10 @@ fn layers(
     parts: &Parts<'_>,
     stages: &[Stage],
     job: &Job,
-    text: &mut Emitter<&mut dyn Write>,
+    text: &mut Emitter<&mut (dyn Write + Send)>,
     watch: &mut Watch<'_>,
 ) -> Result<Printed, Failure> {
-    let mut printed = Printed::default();
+    let printed = Printed::default();
     let columns = supports(parts.all, stages, job, watch)?;
     let mut planner = Planner::new(&job.printer, job.plan);
     if job.tells_progress {
@@ -344,52 +342,16 @@ fn layers(
     }
     let count: usize = stages.iter().map(|stage| stage.printed.len()).sum();
     watch.progress.stage("slice", count as u64);
-    for (index, stage) in stages.iter().enumerate() {
-        let below = index.checked_sub(1).map(|below| &stages[below]);
-        if stages.len() > 1 && stage.morph.is_none() {
-            write(text, &[surface_remark(stage, stage.printed.start)])?;
-        }
-        let mut stacks = stacks(parts.groups, parts.all, stage, below, job);
-        if let Some(first) = stacks.first_mut() {
-            first.stand_on(&columns[index]);
-        }
-        for start in stage.printed.clone().step_by(WINDOW) {
-            watch.interrupt.check()?;
-            let window = start..(start + WINDOW).min(stage.printed.end);
-            for stack in &mut stacks {
-                stack.reach(&window, |tears| printed.count_tears(tears));
-            }
-            let each = stacks.iter().map(|stack| stack.fill(window.clone())).collect();
-            let mut filled = together(each);
-            if !parts.groups.is_empty() && printed.levels.is_empty() {
-                // Skirt and brim go round all.
-                let mut all = Stack::new(parts.all, stage, below, job);
-                let first = start..start + 1;
-                all.reach(&first, |_| {});
-                if let (Some(layer), Some(all)) = (filled.first_mut(), all.fill(first).pop()) {
-                    surround(layer, all);
-                }
-            }
-            for (k, mut filled) in window.zip(filled) {
-                watch.progress.advance(1);
-                // Layers of one stage may pass beside the part, above or below it.
-                if filled.paths.is_empty() && stages.len() > 1 {
-                    continue;
-                }
-                if stage.morph.is_some() {
-                    write(text, &[surface_remark(stage, k)])?;
-                }
-                filled.paths.index = printed.levels.len();
-                planner.follow(stage.form(k));
-                printed.count(&filled, &stage.levels[k]);
-                let normal = |p: &Point3<f64>| stage.normal(k, p);
-                let steps = planner.layer_on(&filled.paths, normal).map_err(|error| {
-                    Failure::new("OutOfEnvelope", error.to_string()).hint(out_of_reach(job))
-                })?;
-                write(text, &steps)?;
-            }
-        }
+    let mut printing = Printing { stages, job, planner, text, progress: watch.progress, printed };
+    let mut filling = Filling::new(parts, stages, &columns, job);
+    let mut filled = filling.next();
+    while let Some(batch) = filled {
+        watch.interrupt.check()?;
+        let (planned, next) = rayon::join(|| printing.print(batch), || filling.next());
+        planned?;
+        filled = next;
     }
+    let Printing { planner, mut printed, .. } = printing;
     let (steps, totals) =
         planner.finish().map_err(|error| Failure::new("Bug", error.to_string()))?;
     text.leave_part();
@@ -399,6 +361,49 @@ fn layers(
         return Err(nothing_to_print(count, job));
     }
     Ok(printed)
+}
+
+/// Layers on their way into the program.
+struct Printing<'a, 't, 'o> {
+    stages: &'a [Stage],
+    job: &'a Job,
+    planner: Planner<'a>,
+    text: &'t mut Emitter<&'o mut (dyn Write + Send)>,
+    progress: &'t mut dyn Progress,
+    printed: Printed,
+}
+
+impl Printing<'_, '_, '_> {
+    /// Plans the layers of a window and writes them.
+    fn print(&mut self, batch: Batch) -> Result<(), Failure> {
+        let stage = &self.stages[batch.stage];
+        let is_one_of_many = self.stages.len() > 1;
+        for tears in &batch.tears {
+            self.printed.count_tears(tears);
+        }
+        if is_one_of_many && stage.morph.is_none() && batch.window.start == stage.printed.start {
+            write(self.text, &[surface_remark(stage, stage.printed.start)])?;
+        }
+        for (k, mut filled) in batch.window.zip(batch.layers) {
+            self.progress.advance(1);
+            // Layers of one stage may pass beside the part, above or below it.
+            if filled.paths.is_empty() && is_one_of_many {
+                continue;
+            }
+            if stage.morph.is_some() {
+                write(self.text, &[surface_remark(stage, k)])?;
+            }
+            filled.paths.index = self.printed.levels.len();
+            self.planner.follow(stage.form(k));
+            self.printed.count(&filled, &stage.levels[k]);
+            let normal = |p: &Point3<f64>| stage.normal(k, p);
+            let steps = self.planner.layer_on(&filled.paths, normal).map_err(|error| {
+                Failure::new("OutOfEnvelope", error.to_string()).hint(out_of_reach(self.job))
+            })?;
+            write(self.text, &steps)?;
+        }
+        Ok(())
+    }
 }
 
 /// Models on the bed.
@@ -481,7 +486,7 @@ fn nothing_to_print(layers: usize, job: &Job) -> Failure {
     .hint("check the units of the file (--units), or print with a finer nozzle")
 }
 
-fn write(text: &mut Emitter<&mut dyn Write>, steps: &[Step]) -> Result<(), Failure> {
+fn write(text: &mut Emitter<&mut (dyn Write + Send)>, steps: &[Step]) -> Result<(), Failure> {
     steps.iter().try_for_each(|step| text.step(step)).map_err(written)
 }
 

@@ -3,7 +3,7 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// Told by the pipeline what it is doing.
-pub trait Progress {
+pub trait Progress: Send {
     /// A stage of `total` steps begins; the one before it has ended.
     fn stage(&mut self, name: &'static str, total: u64);
 

@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use super::correction::Correction;
 use super::dialect::{DEGREE_DECIMALS, Dialect, MM_DECIMALS, NEAR_AXIS_DECIMALS, Quantity};
 use super::label::Labels;
-use super::number::{decimal, push_quantum, quantum, value};
+use super::number::{decimal, push_quantum, quantum, scale, value};
 use super::posed::{Drive, MOST_WORDS, PosedWord};
 use super::speed_word::Way;
 use crate::profile::Printer;
@@ -345,8 +345,7 @@ impl<W: Write> Emitter<W> {
         };
         // Rounded down, so that a limit stays a limit; never to nothing. What is a whole number but
         // for its last bits stays one.
-        let scale = 10_f64.powi(decimals as i32);
-        let feed = (word * scale + 1e-3).floor().max(1.0) as i64;
+        let feed = ((word * scale(decimals) + 1e-3) as i64).max(1);
         if feed != self.feed || self.dialect.speed.is_of_one_move() {
             self.line.extend_from_slice(b" F");
             push_quantum(&mut self.line, feed, decimals);

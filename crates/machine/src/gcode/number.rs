@@ -3,6 +3,16 @@
 /// The powers of ten that [`quantum`] can ask for.
 const SCALES: [f64; 7] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
 
+/// Returns how many of the last decimal place are one.
+///
+/// # Panics
+///
+/// When `decimals` exceeds 6.
+#[must_use]
+pub(crate) fn scale(decimals: usize) -> f64 {
+    SCALES[decimals]
+}
+
 /// Returns `value` as a whole number of the last decimal place.
 ///
 /// # Panics
@@ -10,8 +20,9 @@ const SCALES: [f64; 7] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
 /// When `decimals` exceeds 6.
 #[must_use]
 pub(crate) fn quantum(value: f64, decimals: usize) -> i64 {
-    // Saturates far outside of what any axis reaches.
-    (value * SCALES[decimals]).round() as i64
+    // Halves away from zero. Saturates far outside of what any axis reaches.
+    let scaled = value * SCALES[decimals];
+    (scaled + 0.5_f64.copysign(scaled)) as i64
 }
 
 /// Returns the value that `count` of the last decimal place stand for.
@@ -20,39 +31,41 @@ pub(crate) fn value(count: i64, decimals: usize) -> f64 {
     count as f64 / SCALES[decimals]
 }
 
+/// Sign, point and the digits of the greatest `u64`.
+const MOST_CHARACTERS: usize = 22;
+
 /// Appends a whole number of the last decimal place as a decimal number without trailing zeros.
 pub(crate) fn push_quantum(out: &mut Vec<u8>, count: i64, decimals: usize) {
-    if count < 0 {
-        out.push(b'-');
-    }
-    let scale = 10_u64.pow(decimals as u32);
-    let magnitude = count.unsigned_abs();
-    push_whole(out, magnitude / scale, 1);
-    let mut rest = magnitude % scale;
-    if rest == 0 {
-        return;
-    }
+    let mut text = [0; MOST_CHARACTERS];
+    let mut first = MOST_CHARACTERS;
+    let mut put = |character: u8| {
+        first -= 1;
+        text[first] = character;
+    };
+    let mut rest = count.unsigned_abs();
     let mut places = decimals;
-    while rest.is_multiple_of(10) {
+    while places > 0 && rest.is_multiple_of(10) {
         rest /= 10;
         places -= 1;
     }
-    out.push(b'.');
-    push_whole(out, rest, places);
-}
-
-/// Appends a whole number with at least so many digits.
-fn push_whole(out: &mut Vec<u8>, mut number: u64, least_digits: usize) {
-    /// Digits of the greatest `u64`.
-    const MOST_DIGITS: usize = 20;
-    let mut digits = [b'0'; MOST_DIGITS];
-    let mut first = MOST_DIGITS;
-    while number > 0 {
-        first -= 1;
-        digits[first] = b'0' + (number % 10) as u8;
-        number /= 10;
+    if places > 0 {
+        for _ in 0..places {
+            put(b'0' + (rest % 10) as u8);
+            rest /= 10;
+        }
+        put(b'.');
     }
-    out.extend_from_slice(&digits[first.min(MOST_DIGITS - least_digits)..]);
+    loop {
+        put(b'0' + (rest % 10) as u8);
+        rest /= 10;
+        if rest == 0 {
+            break;
+        }
+    }
+    if count < 0 {
+        put(b'-');
+    }
+    out.extend_from_slice(&text[first..]);
 }
 
 /// Returns `value` with at most `decimals` places.
@@ -79,6 +92,8 @@ mod tests {
             (1e6 + 0.1, 1, "1000000.1"),
             (0.0, 0, "0"),
             (100.0, 3, "100"),
+            (-0.5, 1, "-0.5"),
+            (1e300, 6, "9223372036854.775807"),
         ] {
             assert_eq!(decimal(value, decimals), text);
         }

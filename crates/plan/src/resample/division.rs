@@ -121,7 +121,8 @@ impl Resampler {
         (spread, count): (&Spread, u32),
         legs: &mut Vec<Leg>,
     ) -> Result<bool, Unreachable> {
-        let before = (self.joints, self.over_bed, self.at_part, legs.len());
+        let before = (self.joints, self.facing, self.over_bed, self.at_part);
+        let legs_before = legs.len();
         let (from, from_z) = (self.over_bed, self.joints.z);
         let length = (target.over_bed - from).norm();
         for k in 1..=count {
@@ -134,8 +135,8 @@ impl Resampler {
             };
             let to = self.joints_at(&end)?;
             if !self.is_near_enough(&to, &end, tolerance) {
-                legs.truncate(before.3);
-                (self.joints, self.over_bed, self.at_part, _) = before;
+                legs.truncate(legs_before);
+                (self.joints, self.facing, self.over_bed, self.at_part) = before;
                 return Ok(false);
             }
             self.push(kind, to, &end, legs)?;

@@ -5,8 +5,7 @@
 //! within the chord tolerance, at the ends and in the middle of every stroke.
 
 use machine::gcode::dialect::Space;
-use machine::program::Joints;
-use nalgebra::{Point2, Point3};
+use nalgebra::{Point2, Vector3};
 
 use super::{Leg, Resampler, Target, turned};
 use crate::route::{Kind, Stroke};
@@ -35,9 +34,7 @@ impl Resampler {
         if !is_joints || strokes[0].kind != Kind::Print || is_off_line {
             return None;
         }
-        let continued = strokes[1..].iter().take(MOST_STROKES - 1);
-        let mut most = 1 + continued.take_while(|stroke| stroke.continues).count();
-        if most < 2 {
+        if !strokes.get(1)?.continues {
             return None;
         }
         let clearance = self.clear_radius(self.joints.z);
@@ -51,6 +48,8 @@ impl Resampler {
         if !self.may_follow(&target(&strokes[0])?, &target(&strokes[1])?) {
             return None;
         }
+        let continued = strokes[1..].iter().take(MOST_STROKES - 1);
+        let mut most = 1 + continued.take_while(|stroke| stroke.continues).count();
         let mut places = strokes[..most].iter().map_while(target);
         let mut targets: Vec<Target> = Vec::new();
         // Twice as many as long as that goes well, then the exact number between. Most moves are a
@@ -115,6 +114,17 @@ impl Resampler {
         {
             return false;
         }
+        let sweep = self.sweep(&to);
+        let rise = to.z - from.z;
+        let passes = |place: &Target, share: f64| {
+            // Where the move should be about there it passes at this distance.
+            let (here, heading) = sweep.at(share);
+            let aside = place.over_bed - here;
+            let off = Vector3::new(aside.x, aside.y, place.z - (from.z + rise * share));
+            let along = Vector3::new(heading.x, heading.y, rise);
+            let along_it = off.dot(&along) / along.norm_squared();
+            (off - along * along_it).norm() <= self.params.chord
+        };
         let mut done = 0.0;
         let mut before = from;
         targets.iter().zip(&lengths).all(|(target, length)| {
@@ -122,29 +132,12 @@ impl Resampler {
                 over_bed: nalgebra::center(&before.over_bed, &target.over_bed),
                 z: f64::midpoint(before.z, target.z),
             };
-            let passes = |place: &Target, share: f64| self.distance_at(&to, share, place);
-            let tolerance = self.params.chord;
-            let near = passes(&middle, (done + length / 2.0) / whole) <= tolerance
-                && passes(target, (done + length) / whole) <= tolerance;
+            let near = passes(&middle, (done + length / 2.0) / whole)
+                && passes(target, (done + length) / whole);
             done += length;
             before = *target;
             near
         })
-    }
-
-    /// How far the move to `to` passes from a place that it should reach after about `share` of its
-    /// way, mm.
-    fn distance_at(&self, to: &Joints, share: f64, place: &Target) -> f64 {
-        const STEP: f64 = 1e-3;
-        let at = |share: f64| {
-            let joints = self.params.dialect.between(&self.joints, to, share);
-            let over_bed = self.over_bed_at(&joints);
-            Point3::new(over_bed.x, over_bed.y, joints.z)
-        };
-        let here = at(share);
-        let along = (at(share + STEP) - at(share - STEP)).normalize();
-        let off = Point3::new(place.over_bed.x, place.over_bed.y, place.z) - here;
-        (off - along * off.dot(&along)).norm()
     }
 }
 
