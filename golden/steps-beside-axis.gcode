@@ -602,6 +602,7 @@ M84
 ; fill_pattern = rectilinear
 ; solid_fill_pattern = rectilinear
 ; top_fill_pattern = monotonic
+; infill_every_layers = 1
 ; infill_anchor_max = 10
 ; fill_angle = 45
 ; solid_infill_below_area = 20

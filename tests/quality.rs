@@ -311,3 +311,72 @@ fn thin_walls_are_laid_and_the_share_is_told() {
     let laid = number(&comb["print"]["part_mm3"]) / number(&comb["model"]["volume_mm3"]);
     assert!((0.96..1.01).contains(&laid), "{laid}");
 }
+
+/// Layers with sparse infill, and length (mm), volume (mm³) and greatest cross-section (mm²) of its lines.
+fn sparse(text: &str) -> (Vec<usize>, [f64; 3]) {
+    let all = motions(text);
+    let lines = all.iter().filter(|m| m.lays() && m.role == "Internal infill");
+    let (mut layers, mut sums) = (Vec::new(), [0.0; 3]);
+    for motion in lines {
+        layers.extend(motion.layer);
+        sums[0] += motion.path();
+        sums[1] += motion.volume();
+        if motion.path() > 1.0 {
+            sums[2] = sums[2].max(motion.volume() / motion.path());
+        }
+    }
+    layers.dedup();
+    (layers, sums)
+}
+
+#[test]
+fn sparse_infill_is_laid_for_several_layers_at_once() {
+    let block = mesh::shapes::cube(20.0);
+    for layers in ["planar", "conical", "spherical"] {
+        let common = [
+            "--layers",
+            layers,
+            "--cone-angle",
+            "20",
+            "--verify",
+            "full",
+            "--set",
+            "fill_density=0.4",
+        ];
+        let each = sliced(&block, &common);
+        let wanted = |n| sliced(&block, &[&common[..], &["--set", n]].concat());
+        let double = wanted("infill_every_layers=2");
+        // A bore of 0.4 mm lays no more than two layers of 0.2 mm.
+        assert_eq!(motions(&double).len(), motions(&wanted("infill_every_layers=3")).len());
+        let (of_each, of_double) = (sparse(&each), sparse(&double));
+        let share = of_double.0.len() as f64 / of_each.0.len() as f64;
+        assert!(share < 0.6 || layers != "planar", "{layers}: in {share} of the layers");
+        let [length, volume, area] = [0, 1, 2].map(|k| of_double.1[k] / of_each.1[k]);
+        assert!(length < 0.72, "{layers}: {length} of the length");
+        assert!((0.95..1.08).contains(&volume), "{layers}: {volume} of the volume");
+        assert!((1.7..2.0).contains(&area), "{layers}: {area} of the cross-section");
+        let thick = |height: &str| height.parse().is_ok_and(|h: f64| (h - 0.4).abs() < 0.005);
+        let told = |text: &str| {
+            text.lines()
+                .filter_map(|line| line.strip_prefix(";HEIGHT:"))
+                .filter(|h| thick(h))
+                .count()
+        };
+        assert!(
+            told(&double) > 10 && told(&each) == 0,
+            "{layers}: {} {}",
+            told(&double),
+            told(&each)
+        );
+    }
+}
+
+#[test]
+fn a_bead_thinner_than_announced_is_found() {
+    let block = mesh::shapes::cube(12.0);
+    let text = sliced(&block, &["--set", "infill_every_layers=2"]);
+    let scratch = Scratch::new();
+    scratch.file("x.gcode", text.replace(";HEIGHT:0.4", ";HEIGHT:0.3"));
+    let ran = scratch.run(&["verify", "x.gcode"]).expect(1);
+    assert!(ran.out.contains("flow"), "{}", ran.out);
+}

@@ -239,6 +239,8 @@ pub enum Step {
     Layer(Layer),
     /// What the following moves lay, and the width of the bead, mm.
     Bead(Role, f64),
+    /// How thick the following beads are, mm, where that is not the thickness of their layer.
+    Height(Option<f64>),
     /// The part fan, 0 (off) to 1.
     Fan(f64),
     /// What follows belongs to one of several objects, counted from 0, or to none.

@@ -47,7 +47,7 @@ impl Speeds {
         let speed = match role {
             Role::ExternalPerimeter => self.external_perimeter,
             Role::Perimeter => self.perimeter,
-            Role::InternalInfill => self.infill,
+            Role::InternalInfill | Role::CombinedInfill => self.infill,
             Role::SolidInfill => self.solid_infill,
             Role::TopSolidInfill => self.top_solid_infill,
             Role::BridgeInfill => self.bridge,
@@ -392,6 +392,10 @@ impl Router {
     ) {
         let wanted = speeds.of(line.role, is_first_layer);
         let (mut told, mut told_hangs) = ((f64::NAN, None), false);
+        let is_combined = line.role == Role::CombinedInfill;
+        if let Some(first) = line.stations.first().filter(|_| is_combined) {
+            self.items.push(Item::Step(Step::Height(Some(first.bead.thickness))));
+        }
         for pair in line.stations.windows(2).flat_map(|pair| in_even_pieces(&pair[0], &pair[1])) {
             let (width, area) = if line.role == Role::ExternalPerimeter {
                 within(&pair[0], &pair[1])
@@ -418,6 +422,9 @@ impl Router {
             if let Some(printed) = &mut self.printed {
                 printed.add(&pair[0].at, &pair[1].at);
             }
+        }
+        if is_combined {
+            self.items.push(Item::Step(Step::Height(None)));
         }
         if told_hangs {
             self.items.push(Item::Hangs(false));
@@ -483,7 +490,7 @@ fn program_role(role: Role, overhang: Overhang) -> program::Role {
         Role::Perimeter if overhang >= Overhang::Half => program::Role::OverhangPerimeter,
         Role::ExternalPerimeter => program::Role::ExternalPerimeter,
         Role::Perimeter => program::Role::Perimeter,
-        Role::InternalInfill => program::Role::InternalInfill,
+        Role::InternalInfill | Role::CombinedInfill => program::Role::InternalInfill,
         Role::SolidInfill => program::Role::SolidInfill,
         Role::TopSolidInfill => program::Role::TopSolidInfill,
         Role::BridgeInfill => program::Role::BridgeInfill,

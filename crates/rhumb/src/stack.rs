@@ -11,7 +11,8 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 use slicer::chart::{carried, carried_to_cone};
 use slicer::compensation::{CompensationParams, compensated};
-use slicer::layer::{Filled, fill_layer};
+use slicer::layer::{Filled, Parted};
+use slicer::level::Level;
 use slicer::lift::Lift;
 use slicer::section::{Cutter, Section, Tears};
 use slicer::skins::{Neighbours, SKIN_TOLERANCE_MM};
@@ -112,16 +113,99 @@ impl<'a> Stack<'a> {
 
     /// Fills the layers of a window.
     pub(crate) fn fill(&self, window: Range<usize>) -> Vec<Filled> {
-        window.into_par_iter().map(|k| self.fill_one(k)).collect()
+        let params = &self.job.paths;
+        if self.job.paths.infill.every <= 1 {
+            return window.into_par_iter().map(|k| self.fill_one(k)).collect();
+        }
+        let parted = window.clone().into_par_iter().map(|k| self.part(k));
+        let mut parted: Vec<Option<Parted<'_>>> = parted.collect();
+        for (index, group) in self.combined(&window).into_iter().enumerate() {
+            let layers = &mut parted[group.start - window.start..group.end - window.start];
+            self.combine(layers, group, index);
+        }
+        let filled = parted.into_par_iter();
+        filled.map(|layer| layer.map(|layer| layer.fill(params)).unwrap_or_default()).collect()
+    }
+
+    /// The groups of layers of a window whose sparse infill is laid at once: as many as are wanted, or as
+    /// many as are not too thick together.
+    fn combined(&self, window: &Range<usize>) -> Vec<Range<usize>> {
+        /// Rounding of a sum of heights, mm.
+        const SLACK_MM: f64 = 1e-6;
+        if self.stage.morph.is_some() {
+            return Vec::new();
+        }
+        let how = &self.job.paths.infill;
+        let levels = &self.stage.levels;
+        let most = how.thickest * self.stage.surface.level_step(1.0) + SLACK_MM;
+        let mut groups: Vec<Range<usize>> = Vec::new();
+        // What lies on a stair has a lower side of its own.
+        let stair = usize::from(self.stair.is_some() && window.start == self.stage.printed.start);
+        for k in window.start + stair..window.end {
+            match groups.last_mut() {
+                Some(group)
+                    if group.len() < how.every
+                        && levels[k].upper - levels[group.start].lower <= most =>
+                {
+                    group.end = k + 1;
+                }
+                _ => groups.push(k..k + 1),
+            }
+        }
+        groups.retain(|group| group.len() > 1);
+        groups
+    }
+
+    /// Has the sparse infill that all layers of a group have laid by the last of them.
+    fn combine(&self, layers: &mut [Option<Parted<'_>>], group: Range<usize>, index: usize) {
+        let (params, levels) = (&self.job.paths, &self.stage.levels);
+        let surface = &*self.stage.surface;
+        let last = group.end - 1;
+        let moved = |region: &Region, from: usize, to: usize| {
+            carried(surface, region, levels[from].upper, levels[to].upper)
+        };
+        let mut common: Option<Region> = None;
+        for (k, layer) in group.clone().zip(layers.iter()).rev() {
+            let Some(layer) = layer else { return };
+            let sparse = moved(&layer.sparse(), k, last);
+            let all =
+                common.as_ref().map_or_else(|| sparse.clone(), |all| all.intersection(&sparse));
+            if all.is_empty() {
+                return;
+            }
+            common = Some(all);
+        }
+        let (Some(common), lower) = (common, levels[group.start].lower) else { return };
+        let chart = surface.chart(levels[last].upper);
+        let lift = self.lift(last);
+        let clear = Lift { level: Level { lower, ..lift.level }, ..lift }.clear_of_floor(&common);
+        let region = chart
+            .opened(&clear, params.infill.width)
+            .without_small_islands(params.skins.solid_below_area);
+        if region.is_empty() {
+            return;
+        }
+        for (k, layer) in group.zip(layers) {
+            let Some(layer) = layer else { continue };
+            layer.leave_out(&moved(&region, last, k), params);
+            if k == last {
+                layer.fill_thick(region.clone(), lower, index);
+            }
+        }
     }
 
     fn fill_one(&self, k: usize) -> Filled {
+        self.part(k).map(|layer| layer.fill(&self.job.paths)).unwrap_or_default()
+    }
+
+    /// Takes a layer apart; `None` where nothing of it is.
+    fn part(&self, k: usize) -> Option<Parted<'_>> {
         let lift = self.lift(k);
         let support = self.columns.get(k.wrapping_sub(self.stage.printed.start));
         let support = support.filter(|column| !column.is_empty());
         let material = self.material(k, &lift);
         if material.is_empty() && support.is_none() {
-            return Filled::default();
+            return None;
         }
         let (above, below) = self.beside(k);
         let cover = |i: &usize| self.at_upper(&self.sections[i - self.first].1, *i, k, &lift);
@@ -132,7 +216,7 @@ impl<'a> Stack<'a> {
             below: below.iter().map(AsRef::as_ref).collect(),
             support,
         };
-        fill_layer(&lift, &material, &neighbours, &self.job.paths)
+        Some(Parted::new(&lift, &material, &neighbours, &self.job.paths).on(support))
     }
 
     /// Layers of a window as they are seen along the axis, for what supports them.

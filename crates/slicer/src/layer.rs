@@ -3,14 +3,14 @@
 use std::borrow::Cow;
 
 use geom::grid::{GridPoint, mm};
-use geom::region::{Fill, Island, Region};
+use geom::region::{Fill, Island, Region, Ring};
 use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
 use crate::adhesion::{AdhesionParams, around};
 use crate::bead::Bead;
-use crate::bridge::bridges;
+use crate::bridge::{Bridge, bridges};
 use crate::chart::Chart;
 use crate::compensation::CompensationParams;
 use crate::fuzzy::{FuzzyParams, roughened};
@@ -18,9 +18,10 @@ use crate::hanging::Below;
 use crate::infill;
 use crate::infill::ironing::ironing;
 use crate::infill::{FillLayer, FillLine, InfillParams, angle_in, fill, fill_bridge};
+use crate::level::Level;
 use crate::lift::Lift;
-use crate::skins::{Neighbours, SKIN_TOLERANCE_MM, SkinParams, skins};
-use crate::support::SupportParams;
+use crate::skins::{Neighbours, SKIN_TOLERANCE_MM, SkinParams, Skins, skins};
+use crate::support::{Column, SupportParams};
 use crate::thin::{AxisPoint, ThinParams, axes};
 use crate::toolpath::{IslandPaths, LayerPaths, LostArea, Role, Toolpath, WallGroup};
 use crate::walls::{ThinPlace, WallParams, Walls, split_thin, walls};
@@ -78,59 +79,163 @@ pub fn fill_layer(
     neighbours: &Neighbours<'_>,
     params: &PathParams,
 ) -> Filled {
-    let frame = Frame::of(lift);
-    if params.vase && is_above_the_bottom(lift, material, params) {
-        return vase_layer(material, &frame, params);
+    Parted::new(lift, material, neighbours, params).on(neighbours.support).fill(params)
+}
+
+/// A layer taken apart into what walls, skins and sparse infill take, before lines are drawn: layers can
+/// be compared here.
+pub struct Parted<'a> {
+    lift: Lift<'a>,
+    material: Region,
+    hanging: Below,
+    islands: Vec<PartedIsland>,
+    support: Option<&'a Column>,
+    floating: Vec<Floating>,
+    /// Sparse infill as thick as several layers, and the family that it is part of.
+    thick: Option<Thick<'a>>,
+    is_vase: bool,
+}
+
+/// Sparse infill as thick as several layers.
+struct Thick<'a> {
+    region: Region,
+    /// From the lower side of the lowest of these layers to the upper side of this one.
+    lift: Lift<'a>,
+    /// Counted like layers.
+    index: usize,
+}
+
+/// An island taken apart.
+struct PartedIsland {
+    outline: Region,
+    walls: Walls,
+    /// What is too thin for solid lines.
+    thin: Region,
+    skins: Skins,
+    bridges: Vec<Bridge>,
+}
+
+impl<'a> Parted<'a> {
+    /// Takes the material of a layer apart; regions are in its chart.
+    #[must_use]
+    pub fn new(
+        lift: &Lift<'a>,
+        material: &Region,
+        neighbours: &Neighbours<'_>,
+        params: &PathParams,
+    ) -> Self {
+        let frame = Frame::of(lift);
+        let is_vase = params.vase && is_above_the_bottom(lift, material, params);
+        let level = &lift.level;
+        let below = neighbours.below.first().copied().filter(|_| level.index > 0);
+        let hanging = Below::new(material, below, &frame.chart, params.walls.external_width);
+        let islands = material.islands().par_iter();
+        let islands = islands.map(|island| part(island, &hanging, neighbours, &frame, params));
+        Self {
+            lift: *lift,
+            islands: if is_vase { Vec::new() } else { islands.collect() },
+            floating: if is_vase { Vec::new() } else { floating(material, neighbours, &frame) },
+            material: material.clone(),
+            hanging,
+            support: None,
+            thick: None,
+            is_vase,
+        }
     }
-    let level = &lift.level;
-    let below = neighbours.below.first().copied().filter(|_| level.index > 0);
-    let hanging = Below::new(material, below, &frame.chart, params.walls.external_width);
-    let islands: Vec<(IslandPaths, LostArea)> = material
-        .islands()
-        .par_iter()
-        .map(|island| fill_island(island, &hanging, neighbours, &frame, params))
-        .collect();
-    let mut filled = Filled {
-        paths: LayerPaths {
-            index: level.index,
-            upper: level.upper,
-            thickness: frame.thickness,
-            ..LayerPaths::default()
-        },
-        ..Filled::default()
-    };
-    if level.index > 0 {
-        let ground = neighbours.below.first().map(|below| Ground::of(below)).unwrap_or_default();
-        let carried = neighbours.support.map(|column| &column.carried);
-        let carried = carried.map(|seen| frame.chart.region_under(seen)).unwrap_or_default();
-        let column = Ground::of(&carried);
-        let floats = |island: &&Island| !ground.carries(island) && !column.carries(island);
-        filled.floating =
-            material.filtered(floats).islands().iter().map(|i| frame.floating(i)).collect();
+
+    /// Adds the supports of the layer.
+    #[must_use]
+    pub fn on(self, support: Option<&'a Column>) -> Self {
+        Self { support, ..self }
     }
-    for (paths, lost) in islands {
-        filled.paths.lost.merge(&lost);
-        filled.paths.islands.push(paths);
+
+    /// Returns what sparse infill takes.
+    #[must_use]
+    pub fn sparse(&self) -> Region {
+        let rings = self.islands.iter().flat_map(|island| island.skins.sparse.rings().cloned());
+        let rings: Vec<Ring> = rings.collect();
+        Region::from_grid_rings(&rings, Fill::Positive)
     }
-    filled.paths.supports = supports(neighbours, &frame, params);
-    if level.index == 0 && frame.chart.is_flat() {
-        let bead = Bead { width: params.walls.width, thickness: frame.thickness };
-        let stands = neighbours.support.map(|column| material.union(&column.whole));
-        let stands = stands.as_ref().unwrap_or(material);
-        let adhesion = around(stands, bead.width, bead.spacing(), &params.adhesion);
-        filled.adhesion_out_of_reach = adhesion.out_of_reach;
-        filled.paths.adhesion = adhesion
-            .loops
-            .iter()
-            .map(|points| frame.line(points, bead, Role::SkirtBrim, true))
+
+    /// Leaves out the sparse infill of a region, which thicker lines of a layer above will fill. What
+    /// is left between them and the walls is filled where a line fits in.
+    pub fn leave_out(&mut self, region: &Region, params: &PathParams) {
+        let Frame { chart, thickness, .. } = Frame::of(&self.lift);
+        let spacing = Bead { width: params.infill.width, thickness }.spacing();
+        for island in &mut self.islands {
+            let left = island.skins.sparse.difference(region);
+            island.skins.sparse = chart.opened(&left, spacing);
+        }
+    }
+
+    /// Fills a region with sparse lines as thick as several layers: from the lower side of the lowest,
+    /// which `lower` is the level of, to the upper side of this one. `index` counts such layers.
+    pub fn fill_thick(&mut self, region: Region, lower: f64, index: usize) {
+        let level = Level { lower, ..self.lift.level };
+        self.thick = Some(Thick { region, lift: Lift { level, ..self.lift }, index });
+    }
+
+    /// Draws the lines.
+    #[must_use]
+    pub fn fill(self, params: &PathParams) -> Filled {
+        let frame = Frame::of(&self.lift);
+        let material = &self.material;
+        if self.is_vase {
+            return vase_layer(material, &frame, params);
+        }
+        let level = &self.lift.level;
+        let islands: Vec<(IslandPaths, LostArea)> = self
+            .islands
+            .par_iter()
+            .map(|island| fill_island(island, &self.hanging, self.thick.as_ref(), &frame, params))
             .collect();
+        let mut filled = Filled {
+            paths: LayerPaths {
+                index: level.index,
+                upper: level.upper,
+                thickness: frame.thickness,
+                ..LayerPaths::default()
+            },
+            floating: self.floating,
+            ..Filled::default()
+        };
+        for (paths, lost) in islands {
+            filled.paths.lost.merge(&lost);
+            filled.paths.islands.push(paths);
+        }
+        filled.paths.supports = supports(self.support, &frame, params);
+        if level.index == 0 && frame.chart.is_flat() {
+            let bead = Bead { width: params.walls.width, thickness: frame.thickness };
+            let stands = self.support.map(|column| material.union(&column.whole));
+            let stands = stands.as_ref().unwrap_or(material);
+            let adhesion = around(stands, bead.width, bead.spacing(), &params.adhesion);
+            filled.adhesion_out_of_reach = adhesion.out_of_reach;
+            filled.paths.adhesion = adhesion
+                .loops
+                .iter()
+                .map(|points| frame.line(points, bead, Role::SkirtBrim, true))
+                .collect();
+        }
+        filled
     }
-    filled
+}
+
+/// The islands of a layer that begin in mid-air.
+fn floating(material: &Region, neighbours: &Neighbours<'_>, frame: &Frame<'_>) -> Vec<Floating> {
+    if frame.lift.level.index == 0 {
+        return Vec::new();
+    }
+    let ground = neighbours.below.first().map(|below| Ground::of(below)).unwrap_or_default();
+    let carried = neighbours.support.map(|column| &column.carried);
+    let carried = carried.map(|seen| frame.chart.region_under(seen)).unwrap_or_default();
+    let column = Ground::of(&carried);
+    let floats = |island: &&Island| !ground.carries(island) && !column.carries(island);
+    material.filtered(floats).islands().iter().map(|i| frame.floating(i)).collect()
 }
 
 /// The lines of what supports the part.
-fn supports(neighbours: &Neighbours<'_>, frame: &Frame<'_>, params: &PathParams) -> Vec<Toolpath> {
-    let (Some(column), Some(how)) = (neighbours.support, &params.support) else {
+fn supports(column: Option<&Column>, frame: &Frame<'_>, params: &PathParams) -> Vec<Toolpath> {
+    let (Some(column), Some(how)) = (column, &params.support) else {
         return Vec::new();
     };
     let here = |seen: &Region| {
@@ -244,13 +349,14 @@ const FEW_ISLANDS: usize = 16;
 /// How far from its box an island looks, mm: many times further than beads and anchors of bridges reach.
 const NEAR_MM: f64 = 10.0;
 
-fn fill_island(
+/// Takes an island apart.
+fn part(
     island: &Island,
     hanging: &Below,
     neighbours: &Neighbours<'_>,
     frame: &Frame<'_>,
     params: &PathParams,
-) -> (IslandPaths, LostArea) {
+) -> PartedIsland {
     let outline = Region::from_island(island.clone());
     let [above, below] = [&neighbours.above, &neighbours.below].map(|all| near(&outline, all));
     let [above, below] = [&above, &below].map(|all| all.iter().map(AsRef::as_ref).collect());
@@ -260,8 +366,6 @@ fn fill_island(
     let walls = suitable_walls(&outline, hanging, neighbours, frame, params);
     let solid_bead = Bead { width: params.infill.solid_width, thickness };
     let split = split_thin(&walls.interior, &chart, solid_bead.spacing() / 2.0);
-    let index = frame.lift.level.index;
-    let layer = frame.fill_layer(params);
     let interior = split.thick.thinned(SKIN_TOLERANCE_MM);
     let spacing = solid_bead.spacing();
     let mut skins = skins(&interior, &chart, neighbours, spacing, &params.skins);
@@ -269,21 +373,36 @@ fn fill_island(
         Some(below) => bridges(&mut skins, below, &chart, spacing),
         None => Vec::new(),
     };
+    PartedIsland { outline, walls, thin: split.thin, skins, bridges }
+}
+
+fn fill_island(
+    island: &PartedIsland,
+    hanging: &Below,
+    thick: Option<&Thick<'_>>,
+    frame: &Frame<'_>,
+    params: &PathParams,
+) -> (IslandPaths, LostArea) {
+    let PartedIsland { outline, walls, skins, bridges, .. } = island;
+    let index = frame.lift.level.index;
+    let layer = frame.fill_layer(params);
     let ironed = params.infill.ironing.map_or_else(Vec::new, |how| {
         let across = angle_in(&layer, &params.infill) + FRAC_PI_2;
         ironing(&skins.top, across, &layer, &how)
     });
-    let mut filling = fill(&skins, &layer, &params.infill);
-    for bridge in &bridges {
+    let mut filling = fill(skins, &layer, &params.infill);
+    for bridge in bridges {
         fill_bridge(bridge, &layer, &params.infill, &mut filling);
     }
 
-    let mut thin = walls.thin;
-    let gaps = std::iter::once(split.thin).chain(filling.thin).filter(|gap| !gap.is_empty());
-    thin.extend(gaps.map(|region| ThinPlace { region, role: Role::GapFill }));
+    let between = filling.thin.iter().chain(std::iter::once(&island.thin));
+    let gaps = between.filter(|gap| !gap.is_empty()).cloned();
+    let gaps: Vec<ThinPlace> =
+        gaps.map(|region| ThinPlace { region, role: Role::GapFill }).collect();
     let mut lost = LostArea::default();
     let mut fills: Vec<Toolpath> = filling.lines.iter().map(|line| frame.fill(line)).collect();
-    for place in &thin {
+    fills.extend(thick.into_iter().flat_map(|thick| thick.lines(outline, params)));
+    for place in walls.thin.iter().chain(&gaps) {
         fills.extend(single_beads(place, frame, params, &mut lost));
     }
     let groups = walls.groups.iter().map(|group| {
@@ -304,7 +423,7 @@ fn fill_island(
     let in_order = filling.in_order.iter().filter(|lines| !lines.is_empty());
     let paths = IslandPaths {
         walls: groups.collect(),
-        outline: frame.seen_from_above(outline),
+        outline: frame.seen_from_above(outline.clone()),
         fills,
         ironing: ironed.iter().map(|line| frame.fill(line)).collect(),
         in_order: in_order
@@ -312,6 +431,21 @@ fn fill_island(
             .collect(),
     };
     (paths, lost)
+}
+
+impl Thick<'_> {
+    /// The lines within an island.
+    fn lines(&self, outline: &Region, params: &PathParams) -> Vec<Toolpath> {
+        let region = self.region.intersection(outline);
+        if region.is_empty() {
+            return Vec::new();
+        }
+        let frame = Frame::of(&self.lift);
+        let layer = FillLayer { index: self.index, ..frame.fill_layer(params) };
+        let lines = infill::sparse::fill(&region, &layer, &params.infill);
+        let role = Role::CombinedInfill;
+        lines.into_iter().map(|line| frame.fill(&FillLine { role, ..line })).collect()
+    }
 }
 
 /// The walls of an island: as many as are wanted, or one on top, or more where they hang over.

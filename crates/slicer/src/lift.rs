@@ -80,6 +80,17 @@ impl Lift<'_> {
         self.where_holds(&laid, self.ceiling.is_some(), |p| p.z <= ceiling)
     }
 
+    /// Returns the part of a region of the chart where the layer is as thick as everywhere, and one
+    /// more such layer fits between it and the floor.
+    #[must_use]
+    pub fn clear_of_floor(&self, region: &Region) -> Region {
+        let Some(floor) = self.floor else { return region.clone() };
+        let upright = |p: &Point3<f64>| {
+            self.level.thickness() * self.surface.thickness_per_level(p) / self.surface.slope_cos(p)
+        };
+        self.where_holds(region, true, |p| p.z - floor >= 2.0 * upright(p))
+    }
+
     /// The part of a region where a condition holds that changes once on the meridian: layers fall
     /// outwards all the way, or rise.
     fn where_holds(

@@ -14,6 +14,8 @@ pub enum Role {
     Perimeter,
     /// Sparse infill.
     InternalInfill,
+    /// Sparse infill as thick as several layers.
+    CombinedInfill,
     /// Solid infill that ends up inside or on the bed.
     SolidInfill,
     /// Solid infill that is seen from above.

@@ -116,6 +116,10 @@ pub struct Replay {
     slopes: bool,
     role: Role,
     width: f64,
+    /// The thickness announced since the layer began, mm.
+    bead_height: Option<f64>,
+    /// Whether the layer has its number: what is announced after it is said of beads.
+    in_layer: bool,
 }
 
 impl Replay {
@@ -146,6 +150,8 @@ impl Replay {
             slopes: false,
             role: Role::Custom,
             width: 0.0,
+            bead_height: None,
+            in_layer: false,
         }
     }
 
@@ -357,6 +363,7 @@ impl Replay {
             layer: self.layer,
             role: self.role,
             width: self.width,
+            height: self.bead_height,
             joints,
             part: [from.part, to.part],
             nearest: curve.nearest_to_axis(),
@@ -404,13 +411,20 @@ impl Replay {
             self.width = number(width).unwrap_or(self.width);
         } else if comment == "LAYER_CHANGE" {
             (self.top, self.height) = (None, None);
+            (self.bead_height, self.in_layer) = (None, false);
             self.slopes = false;
         } else if let Some(top) = comment.strip_prefix("Z:") {
             self.top = number(top);
         } else if let Some(height) = comment.strip_prefix("HEIGHT:") {
-            self.height = number(height);
+            let height = number(height);
+            if self.in_layer {
+                self.bead_height = height.filter(|_| height != self.height);
+            } else {
+                self.height = height;
+            }
         } else if let Some(index) = comment.strip_prefix("LAYER:").and_then(|n| n.parse().ok()) {
             self.layer = Some(index);
+            self.in_layer = true;
             let Self { line, top, height, family, .. } = *self;
             let climbs = std::mem::take(&mut self.climbs);
             return Event::Layer(LayerMark { line, index, top, height, family, climbs });

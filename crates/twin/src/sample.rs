@@ -56,6 +56,7 @@ pub(crate) fn segment(from: Joints, to: Joints, feed: f64) -> Segment {
         filament: 0.0,
         feed: Feed::mm_per_s(feed),
         duration: path / feed,
+        height: None,
         slopes: false,
         is_paced: false,
     }

@@ -37,6 +37,8 @@ pub struct Segment {
     pub role: Role,
     /// The width of the bead as announced last, mm; 0 before that.
     pub width: f64,
+    /// The thickness of the bead as announced within its layer, mm; `None` where it is that of the layer.
+    pub height: Option<f64>,
     /// The joints at both ends; `None` where the firmware takes part coordinates.
     pub joints: Option<[Joints; 2]>,
     /// Where the nozzle is in the part at both ends, mm.

@@ -206,7 +206,7 @@ impl<'a> Watch<'a> {
     }
 
     fn thickness_of(&self, segment: &Segment, mark: &LayerMark) -> f64 {
-        let height = mark.height.unwrap_or_default();
+        let height = segment.height.or(mark.height).unwrap_or_default();
         match segment.thickness(self.filament_area) {
             Some(thickness) if thickness > 0.0 && thickness < THICKEST * height => thickness,
             Some(_) => height,

@@ -58,6 +58,10 @@ pub struct Emitter<W> {
     /// Filament that rounding has kept back so far, mm.
     filament_owed: f64,
     bead: Option<(Role, i64)>,
+    /// Thickness of the layer, and of the beads wanted and told, in the last place.
+    layer_height: i64,
+    wanted_height: i64,
+    told_height: i64,
     labels: Option<Labels>,
     /// The object that the lines belong to.
     object: Option<usize>,
@@ -82,6 +86,9 @@ impl<W: Write> Emitter<W> {
             feed: 0,
             filament_owed: 0.0,
             bead: None,
+            layer_height: 0,
+            wanted_height: 0,
+            told_height: 0,
             labels: None,
             object: None,
             lines: 0,
@@ -113,6 +120,10 @@ impl<W: Write> Emitter<W> {
             Step::Posed(posed) => self.stance(posed),
             Step::Layer(layer) => self.layer(layer),
             Step::Bead(role, width) => self.bead(*role, *width),
+            Step::Height(height) => {
+                self.height(*height);
+                Ok(())
+            }
             Step::Fan(share) => self.fan(*share),
             Step::Object(object) => self.object(*object),
             Step::Elapsed(seconds) => self.text(&format!("{ELAPSED}{}", decimal(*seconds, 1))),
@@ -420,6 +431,9 @@ impl<W: Write> Emitter<W> {
         let top = decimal(layer.top, MM_DECIMALS);
         self.text(";LAYER_CHANGE")?;
         self.text(&format!(";Z:{top}"))?;
+        self.layer_height = quantum(layer.height, MM_DECIMALS);
+        self.wanted_height = self.layer_height;
+        self.told_height = self.layer_height;
         self.text(&format!(";HEIGHT:{}", decimal(layer.height, MM_DECIMALS)))?;
         self.text(&format!(";LAYER:{}", layer.index))?;
         for word in ["BEFORE", "AFTER"] {
@@ -430,7 +444,18 @@ impl<W: Write> Emitter<W> {
         self.recount()
     }
 
+    /// Takes note of a thickness, which is told with the next bead.
+    fn height(&mut self, height: Option<f64>) {
+        self.wanted_height =
+            height.map_or(self.layer_height, |height| quantum(height, MM_DECIMALS));
+    }
+
     fn bead(&mut self, role: Role, width: f64) -> io::Result<()> {
+        if self.wanted_height != self.told_height {
+            self.told_height = self.wanted_height;
+            let height = decimal(value(self.told_height, MM_DECIMALS), MM_DECIMALS);
+            self.text(&format!(";HEIGHT:{height}"))?;
+        }
         let width = quantum(width, 2);
         let (last_role, last_width) = self.bead.unzip();
         if last_role != Some(role) {

@@ -129,6 +129,7 @@ impl Foreign {
             line,
             layer: self.layer,
             role: self.role,
+            height: None,
             width: self.width,
             joints: None,
             part: [from, stroke.to],

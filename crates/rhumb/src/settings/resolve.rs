@@ -487,6 +487,8 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
             longest_join: get.number("infill_anchor_max_mm"),
             bridge_flow: get.number("bridge_flow_ratio"),
             overlap: get.number("infill_overlap"),
+            every: get.count("infill_every_layers"),
+            thickest: get.number("nozzle_diameter_mm").min(get.number("infill_extrusion_width_mm")),
             ironing: get.switch("ironing").then(|| IroningParams {
                 spacing: get.number("ironing_spacing_mm"),
                 flow: get.number("ironing_flow"),

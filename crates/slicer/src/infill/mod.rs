@@ -16,7 +16,7 @@ pub(crate) mod ironing;
 mod link;
 mod monotonic;
 mod rectilinear;
-mod sparse;
+pub(crate) mod sparse;
 mod spiral;
 pub(crate) mod support;
 
@@ -113,6 +113,10 @@ pub struct InfillParams {
     pub overlap: f64,
     /// How tops are ironed, if they are.
     pub ironing: Option<IroningParams>,
+    /// How many layers the lines of sparse areas are as thick as, where that many have a sparse area.
+    pub every: usize,
+    /// As thick as this such lines may be, mm.
+    pub thickest: f64,
 }
 
 /// A line of infill in the chart.
@@ -403,6 +407,8 @@ mod tests {
         bridge_flow: 1.0,
         overlap: 0.0,
         ironing: None,
+        every: 1,
+        thickest: 0.4,
     };
 
     const PATTERNS: [Pattern; 10] = [

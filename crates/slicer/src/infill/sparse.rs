@@ -37,7 +37,7 @@ const GREATEST_STEP_MM: f64 = 1.0;
 const MOST_STEPS: f64 = 2048.0;
 
 /// Fills a sparse area.
-pub(super) fn fill(area: &Region, layer: &FillLayer<'_>, params: &InfillParams) -> Vec<FillLine> {
+pub(crate) fn fill(area: &Region, layer: &FillLayer<'_>, params: &InfillParams) -> Vec<FillLine> {
     let bead = Bead { width: params.width, thickness: layer.thickness };
     let spacing = bead.spacing() / params.density;
     let from_edge = (bead.spacing() / 2.0 - params.overlap * bead.width).max(0.0);

@@ -115,7 +115,8 @@ impl Flow {
     pub(crate) fn segment(&mut self, segment: &Segment, doubt: &Doubt, findings: &mut Findings) {
         self.melts(segment, doubt, findings);
         let Some(mark) = self.mark else { return };
-        let Some(height) = mark.height.filter(|height| *height > 0.0) else { return };
+        let height = segment.height.or(mark.height);
+        let Some(height) = height.filter(|height| *height > 0.0) else { return };
         if !segment.extrudes() || segment.role == Role::Custom || segment.width <= 0.0 {
             return;
         }

@@ -100,8 +100,11 @@ impl Volume {
             return;
         }
         self.by_role[role_index(segment.role)] += segment.filament;
+        let mut volume = segment.filament * self.filament_area;
+        if let Some(thick) = segment.height.filter(|_| is_part(segment.role)) {
+            volume -= self.below(volume, thick);
+        }
         let Some(layer) = self.layers.last_mut() else { return };
-        let volume = segment.filament * self.filament_area;
         if is_part(segment.role) {
             layer.part += volume;
             let in_plane =
@@ -110,6 +113,21 @@ impl Volume {
         } else {
             layer.other += volume;
         }
+    }
+
+    /// Gives layers below the last their shares of a bead that is as thick as several, and returns what
+    /// they got, mm³.
+    fn below(&mut self, volume: f64, thick: f64) -> f64 {
+        let own = self.layers.last().and_then(|layer| layer.height).unwrap_or(thick);
+        let (mut left, mut given) = (thick - own, 0.0);
+        for layer in self.layers.iter_mut().rev().skip(1) {
+            let Some(height) = layer.height.filter(|_| left > rounding::LENGTH) else { break };
+            let share = volume * height.min(left) / thick;
+            layer.part += share;
+            given += share;
+            left -= height;
+        }
+        given
     }
 
     /// Begins a layer, with the section at its middle when there is a mesh.

@@ -283,6 +283,13 @@ pub(super) const KEYS: &[Key] = &[
         "lines of solid areas that are seen from above; monotonic ones are laid from one side to the \
          other, joined at their ends or (monotoniclines) each on its own",
     ),
+    count(
+        Print,
+        "infill_every_layers",
+        (1, 1, 100),
+        "how many layers sparse lines are as thick as, where that many have sparse infill: as many as fit \
+         into the bore of the nozzle, and into the width of the lines",
+    ),
     number(
         Print,
         "infill_anchor_max_mm",
