@@ -84,8 +84,8 @@ fn servers_with_faults_end_soon_and_no_key_is_shown() {
     let nonsense = |stream: TcpStream| reply(stream, "\u{1b}[2J\0\0\r\n\r\n\u{1b}[31m");
     for fault in [page, broken, nonsense, breaks_off, floods, announces_for_ever, |_| {}] {
         for kind in ["moonraker", "octoprint"] {
-            // One that answers an upload with 200 and nonsense is believed.
-            assert!(told(fault, &["--server", kind]).1 < PATIENCE);
+            let (status, took) = told(fault, &["--server", kind]);
+            assert!(status == 10 && took < PATIENCE, "{kind}: {status} {took:?}");
         }
     }
 }

@@ -4,8 +4,13 @@
 use super::Corpus;
 use crate::run::root;
 
+/// Printers on a line that say odd things and do what they are told, and those that do not.
+const SERIAL: &str = "crates/rhumb/tests/calibrate_scan.rs::a_printer_on_a_line_is_calibrated";
+const SERIAL_FAULT: &str =
+    "crates/rhumb/tests/calibrate_scan.rs::whatever_a_printer_does_nothing_wrong_is_written";
+
 /// Cases and the tests that they are, `file::test`. Several cases begin alike.
-const HELD_BY: [(&str, &str); 49] = [
+const HELD_BY: [(&str, &str); 53] = [
     ("missing", "tests/cli.rs::what_cannot_be_read_is_status_3"),
     ("dir_as_file", "tests/cli.rs::what_cannot_be_read_is_status_3"),
     ("symlink_loop", "tests/environment.rs::what_leads_nowhere_is_told"),
@@ -72,10 +77,11 @@ const HELD_BY: [(&str, &str); 49] = [
     ("net_500", "tests/send.rs::what_a_server_will_not_take_is_told_in_its_words"),
     ("net_tls_self_signed", "tests/send.rs::nobody_there_and_no_print_server_there"),
     ("net_", "tests/send_faults.rs::servers_with_faults_end_soon_and_no_key_is_shown"),
-    (
-        "serial_",
-        "crates/rhumb/tests/calibrate_scan.rs::whatever_a_printer_does_nothing_wrong_is_written",
-    ),
+    ("serial_resend_loop", SERIAL_FAULT),
+    ("serial_resend", SERIAL),
+    ("serial_wait_busy", SERIAL),
+    ("serial_temp_autoreport", SERIAL),
+    ("serial_", SERIAL_FAULT),
 ];
 
 #[test]

@@ -106,6 +106,24 @@ enum Fault {
     Garbage,
     /// An error on every motion.
     Refuses,
+    /// Stops for good, as Marlin does when a heater runs away.
+    Halts(usize),
+    /// A megabyte without the end of a line.
+    Noise(usize),
+    /// Asks for every third line again, once with the number of that line and once with another.
+    Resends,
+    /// Asks for the same line for ever.
+    ResendsForEver(usize),
+    /// Works on a line for longer than anybody waits for an answer, and says so.
+    Busy,
+    /// Tells its temperatures unasked.
+    Temperatures,
+    /// Two answers to each line.
+    Flood(usize),
+    /// Begins anew.
+    Resets(usize),
+    /// Begins when the line is opened, and has not heard the first line.
+    Boots,
 }
 
 /// A firmware at the other end of a pseudo-terminal; returns the device and what it was told.
@@ -156,6 +174,12 @@ fn serve(line: File, slave: OwnedFd, fault: Fault) -> Vec<String> {
             Fault::Slow => thread::sleep(Duration::from_millis(10)),
             _ => {}
         }
+        if let Some(instead) = instead(fault, told.len()) {
+            if out.write_all(&instead).is_err() {
+                break;
+            }
+            continue;
+        }
         let mut answer = match (fault, command.starts_with("G1")) {
             (Fault::Refuses, true) => "Error: not homed\n".to_owned(),
             _ => format!("{}ok\n", obey(&mut rig, &command)),
@@ -168,6 +192,16 @@ fn serve(line: File, slave: OwnedFd, fault: Fault) -> Vec<String> {
             Fault::Garbage if command.starts_with("M5801") => {
                 answer = "seek hit Tx9\nok\n".to_owned();
             }
+            Fault::Busy if told.len() == 30 => {
+                for _ in 0..6 {
+                    out.write_all(b"echo:busy: processing\n").expect("somebody listens");
+                    thread::sleep(Duration::from_millis(500));
+                }
+            }
+            Fault::Temperatures => {
+                answer = format!(" T:210.0 /210.0 B:60.0 /60.0 @:64\n{answer}T:209.9 B:60.1\n");
+            }
+            Fault::Flood(after) if told.len() > after => answer.push_str("ok\n"),
             _ => {}
         }
         if out.write_all(answer.as_bytes()).is_err() {
@@ -175,6 +209,33 @@ fn serve(line: File, slave: OwnedFd, fault: Fault) -> Vec<String> {
         }
     }
     told
+}
+
+/// What a firmware says in place of doing what it is told.
+fn instead(fault: Fault, told: usize) -> Option<Vec<u8>> {
+    let text = match fault {
+        Fault::Halts(after) if told > after => "Error:Printer halted. kill() called!\n".to_owned(),
+        Fault::ResendsForEver(after) if told > after => "Resend: 5\nok\n".to_owned(),
+        Fault::Resets(after) if told > after => "start\necho:Marlin 2.1\nok\n".to_owned(),
+        Fault::Boots if told == 1 => "start\necho:Marlin 2.1\n".to_owned(),
+        // What is asked for again comes again, and is done then.
+        Fault::Resends if told % 12 == 3 => format!("Resend: {told}\nok\n"),
+        Fault::Resends if told % 12 == 7 => "Resend: 5\nok\n".to_owned(),
+        // Without an `ok`, once: its absence is waited for.
+        Fault::Resends if told == 17 => "rs 17\n".to_owned(),
+        Fault::Noise(after) if told == after => {
+            let mut chance = 1_u32;
+            let mut byte = || {
+                chance = chance.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let byte = chance.to_le_bytes()[3];
+                if byte == b'\n' || byte == b'\r' { b'x' } else { byte }
+            };
+            return Some((0..1 << 20).map(|_| byte()).collect());
+        }
+        Fault::Noise(after) if told > after => String::new(),
+        _ => return None,
+    };
+    Some(text.into_bytes())
 }
 
 fn obey(rig: &mut SimulatedRig, command: &str) -> String {
@@ -215,11 +276,19 @@ fn scan_over(line: &Path, folder: &Path, timeout: &str) -> Child {
 
 #[test]
 fn a_printer_on_a_line_is_calibrated() {
-    for (name, fault) in [("line", Fault::None), ("chatter", Fault::Chatter)] {
+    for (name, fault, timeout) in [
+        ("line", Fault::None, "20"),
+        ("chatter", Fault::Chatter, "20"),
+        ("boots", Fault::Boots, "20"),
+        ("resends", Fault::Resends, "20"),
+        ("temperatures", Fault::Temperatures, "20"),
+        // It works for 3 s, and nobody waits for longer than 1.
+        ("busy", Fault::Busy, "1"),
+    ] {
         let folder = folder(name);
         let (line, firmware) = firmware(fault);
-        let done = scan_over(&line, &folder, "20").wait_with_output().expect("it ends");
-        assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+        let done = scan_over(&line, &folder, timeout).wait_with_output().expect("it ends");
+        assert_eq!(done.status.code(), Some(0), "{name}: {}", text(&done.stderr));
         let found = calibration(&folder);
         let machine = machine();
         let a = machine.a + machine.rail_play / 2.0;
@@ -238,6 +307,12 @@ fn whatever_a_printer_does_nothing_wrong_is_written() {
         ("silent", Fault::FallsSilent(60), "did not answer"),
         ("garbage", Fault::Garbage, "answered"),
         ("refuses", Fault::Refuses, "refused"),
+        ("halts", Fault::Halts(50), "Printer halted"),
+        ("noise", Fault::Noise(50), "did not answer"),
+        ("again", Fault::ResendsForEver(50), "send it again"),
+        ("flood", Fault::Flood(50), "answered"),
+        ("resets", Fault::Resets(50), "it started anew"),
+        ("mute", Fault::FallsSilent(0), "did not answer"),
     ] {
         let folder = folder(name);
         let (line, _firmware) = firmware(fault);

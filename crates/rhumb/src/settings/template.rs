@@ -23,8 +23,10 @@ use crate::failure::Failure;
 /// `ConfigUnknownKey` for a name that is none.
 pub fn fill(program: &str, name: &str, settings: &Settings) -> Result<Vec<String>, Failure> {
     let names = OfSettings(settings);
+    // A printer takes a carriage return for the end of a line: what follows is no part of a comment.
+    let program = &program.replace("\r\n", "\n").replace('\r', "\n");
     let mut filler = Filler { names: &names, branches: Vec::new(), filled: String::new() };
-    let mut rest = program;
+    let mut rest = program.as_str();
     while let Some(open) = rest.find(['{', '[', '}']) {
         let before = &program[..program.len() - rest.len() + open];
         let line = before.matches('\n').count() + 1;
@@ -173,7 +175,8 @@ impl Names for OfSettings<'_> {
             Value::Number(number) => Worth::Number(*number),
             Value::Count(count) => Worth::Number(*count as f64),
             Value::Switch(switch) => Worth::Truth(*switch),
-            Value::Text(text) => Worth::Text(text.clone()),
+            // A setting is a word in a line and never ends one.
+            Value::Text(text) => Worth::Text(text.replace(char::is_control, " ")),
         })
     }
 }
@@ -214,6 +217,15 @@ mod tests {
         let lines = "G28\n{if filament_type == \"PLA\" and not (perimeters < 2)}\nM106 S255\n\
             {if nozzle_diameter == 0.6}\nM900\n{endif}\n{else}\nM107 {nothing}\n{endif}\nM83";
         assert_eq!(filled(lines), ["G28", "M106 S255", "M83"]);
+    }
+
+    #[test]
+    fn a_carriage_return_ends_a_line_and_no_value_does() {
+        assert_eq!(filled("; a\rM104 S999\r\nG28\r"), ["; a", "M104 S999", "G28"]);
+        let mut settings = Settings::defaults();
+        settings.set("filament_type=PLA\nM104 S999\r").unwrap();
+        let lines = fill("; {filament_type}!", "p", &settings).unwrap();
+        assert_eq!(lines, ["; PLA M104 S999 !"]);
     }
 
     #[test]

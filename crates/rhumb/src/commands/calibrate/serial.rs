@@ -1,7 +1,9 @@
 //! A printer at the other end of a serial line, as a rig for the search.
 //!
 //! Each line that goes out is answered by lines that end with `ok`; a line that begins with
-//! `error` or `!!` refuses it. Other lines are let pass, so a chatty firmware does no harm.
+//! `error` or `!!` refuses it. A line that begins with `Resend` or `rs` asks for the line again. `start`
+//! says that the printer began anew: nothing it did before is worth anything then. Other lines are let
+//! pass, so a chatty firmware does no harm; `busy` says that an answer will come.
 //!
 //! | line | meaning | answer before `ok` |
 //! | --- | --- | --- |
@@ -52,7 +54,24 @@ pub(super) struct SerialRig {
     lines: Receiver<String>,
     manner: Manner,
     interrupt: Interrupt,
+    /// Whether a line was answered: what the printer says before is of no concern.
+    is_begun: bool,
+    /// Whether the printer began anew since, and has no home any more.
+    is_lost: bool,
 }
+
+/// What comes back for a line.
+enum Answer {
+    Done(Vec<String>),
+    /// The line was not understood, or came before the printer was there.
+    Again,
+}
+
+/// How often a line is sent again. Noise is rare, and a printer that asks for ever never prints.
+const MOST_REPEATS: usize = 5;
+
+/// How long the `ok` after a wish for the line again may take; some firmwares send none.
+const AFTERTHOUGHT: Duration = Duration::from_secs(1);
 
 /// Longest line of a firmware, bytes; more is noise.
 const LONGEST_LINE: usize = 1000;
@@ -85,29 +104,70 @@ impl SerialRig {
         let (sender, lines) = channel();
         // The reader ends when the line does, or with the process.
         thread::spawn(move || read_lines(input, &sender));
-        Ok(Self { out, lines, manner, interrupt })
+        Ok(Self { out, lines, manner, interrupt, is_begun: false, is_lost: false })
     }
 
     /// Sends a line and returns what comes back before `ok`.
     fn ask(&mut self, line: &str) -> Result<Vec<String>, RigError> {
-        // What is left of an earlier answer belongs to no one.
-        while self.lines.try_recv().is_ok() {}
-        self.out
-            .write_all(format!("{line}\n").as_bytes())
-            .and_then(|()| self.out.flush())
-            .map_err(|error| RigError::Gone(error.to_string()))?;
+        for _ in 0..=MOST_REPEATS {
+            self.clear(line)?;
+            self.out
+                .write_all(format!("{line}\n").as_bytes())
+                .and_then(|()| self.out.flush())
+                .map_err(|error| RigError::Gone(error.to_string()))?;
+            if let Answer::Done(answer) = self.answer(line)? {
+                self.is_begun = true;
+                return Ok(answer);
+            }
+        }
+        Err(RigError::Garbled(line.to_owned(), "send it again".to_owned()))
+    }
+
+    /// Lets pass what came since the last answer. An `ok` among it belongs to no line: from there on
+    /// answers would be those of other lines.
+    fn clear(&mut self, line: &str) -> Result<(), RigError> {
+        while let Ok(text) = self.lines.try_recv() {
+            self.look(&text)?;
+            if self.is_begun && is_ok(&text) {
+                let said = "ok before it was sent".to_owned();
+                return Err(RigError::Garbled(line.to_owned(), said));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the printer still is what it was.
+    fn look(&mut self, text: &str) -> Result<(), RigError> {
+        if self.is_begun && is_start(text) {
+            self.is_lost = true;
+            return Err(RigError::Gone("it started anew".to_owned()));
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, line: &str) -> Result<Answer, RigError> {
         let mut answer = Vec::new();
+        let mut is_again = false;
         let mut deadline = Instant::now() + self.manner.patience;
         while answer.len() < MOST_LINES {
             if self.interrupt.check().is_err() {
                 return Err(RigError::Stopped);
             }
             match self.lines.recv_timeout(GLANCE) {
-                Ok(text) if text == "ok" || text.starts_with("ok ") => return Ok(answer),
+                Ok(text) if is_ok(&text) && is_again => return Ok(Answer::Again),
+                Ok(text) if is_ok(&text) => return Ok(Answer::Done(answer)),
                 Ok(text) if text.starts_with("!!") || is_error(&text) => {
                     return Err(RigError::Refused(line.to_owned(), text));
                 }
                 Ok(text) => {
+                    self.look(&text)?;
+                    if is_start(&text) {
+                        return Ok(Answer::Again);
+                    }
+                    if is_resend(&text) {
+                        is_again = true;
+                        deadline = deadline.min(Instant::now() + AFTERTHOUGHT);
+                    }
                     // A busy firmware says so; it is alive.
                     if text.contains("busy") {
                         deadline = Instant::now() + self.manner.patience;
@@ -115,6 +175,7 @@ impl SerialRig {
                     answer.push(text);
                 }
                 Err(RecvTimeoutError::Timeout) if Instant::now() < deadline => {}
+                Err(RecvTimeoutError::Timeout) if is_again => return Ok(Answer::Again),
                 Err(RecvTimeoutError::Timeout) => return Err(RigError::Silent(line.to_owned())),
                 Err(RecvTimeoutError::Disconnected) => {
                     return Err(RigError::Gone("the line was closed".to_owned()));
@@ -150,6 +211,18 @@ impl SerialRig {
     fn wait(&mut self) -> Result<(), RigError> {
         self.ask("M400").map(drop)
     }
+}
+
+fn is_ok(text: &str) -> bool {
+    text == "ok" || text.starts_with("ok ")
+}
+
+fn is_start(text: &str) -> bool {
+    text == "start"
+}
+
+fn is_resend(text: &str) -> bool {
+    text.starts_with("Resend") || text.starts_with("rs ")
 }
 
 fn is_error(text: &str) -> bool {
@@ -209,8 +282,12 @@ impl Rig for SerialRig {
     }
 
     fn park(&mut self) -> Result<(), RigError> {
-        // Parking must work after a stop, too.
+        if self.is_lost {
+            return Err(RigError::Gone("it started anew".to_owned()));
+        }
+        // Parking must work after a stop, too, and after answers too many.
         self.interrupt = Interrupt::default();
+        self.is_begun = false;
         self.carriage_to(self.manner.park)
     }
 }

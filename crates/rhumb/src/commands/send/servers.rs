@@ -19,8 +19,9 @@ pub(super) struct PrintServer<'a> {
 }
 
 impl<'a> PrintServer<'a> {
-    /// Asks which of the two stands there, and whether it takes the key. One that answers and does
-    /// not say is taken for Moonraker until it knows no upload of that kind.
+    /// Asks which of the two stands there, and whether it takes the key. One that knows no such
+    /// question is taken for Moonraker until it knows no upload of that kind; one that answers with a
+    /// page for people, or anything else that neither says, gets no program.
     pub(super) fn find(
         server: &'a Server,
         key: &'a Option<Key>,
@@ -28,6 +29,7 @@ impl<'a> PrintServer<'a> {
     ) -> Result<Self, Failure> {
         let kinds =
             told.map_or(vec![ServerKind::Moonraker, ServerKind::Octoprint], |kind| vec![kind]);
+        let mut is_another = false;
         for kind in kinds {
             let found = Self { server, key, kind, is_known: true };
             let answer = found.get(match kind {
@@ -36,12 +38,14 @@ impl<'a> PrintServer<'a> {
             })?;
             match answer.status {
                 401 | 403 => return Err(found.key_refused()),
-                200..300 => return Ok(found),
+                200..300 if object(&answer).is_some() => return Ok(found),
+                200..300 => is_another = true,
                 _ if told.is_some() => return Ok(found),
                 _ => {}
             }
         }
-        Ok(Self { server, key, kind: ServerKind::Moonraker, is_known: false })
+        let guessed = Self { server, key, kind: ServerKind::Moonraker, is_known: false };
+        if is_another { Err(guessed.unknown()) } else { Ok(guessed) }
     }
 
     fn unknown(&self) -> Failure {
@@ -105,7 +109,9 @@ impl<'a> PrintServer<'a> {
             }
         };
         match answer.status {
-            200..300 => Ok(true),
+            204 => Ok(true),
+            200..300 if object(&answer).is_some() => Ok(true),
+            200..300 => Err(self.nonsense("whether it prints is not known")),
             // Not ready, or printing something else.
             400 | 409 | 503 => Ok(false),
             _ => Err(self.refused(&answer)),
@@ -139,7 +145,9 @@ impl<'a> PrintServer<'a> {
         if !(200..300).contains(&answer.status) {
             return Err(self.refused(&answer));
         }
-        let said: Value = serde_json::from_slice(&answer.body).unwrap_or_default();
+        let said = object(&answer)
+            .filter(|said| STORED.iter().any(|name| said.get(name).is_some()))
+            .ok_or_else(|| self.nonsense("whether the program was stored is not known"))?;
         // Some versions wrap their answers.
         let said = if said["result"].is_object() { &said["result"] } else { &said };
         if said["item"]["size"].as_u64().is_some_and(|size| size > length) {
@@ -152,6 +160,13 @@ impl<'a> PrintServer<'a> {
             ServerKind::Moonraker => said["print_started"] == true || said["print_queued"] == true,
             ServerKind::Octoprint => said["effectivePrint"] == true,
         }))
+    }
+
+    /// A success in words that such a server never says, as those of proxies and login pages.
+    fn nonsense(&self, what: &str) -> Failure {
+        let message = format!("the answer is none of {}: {what}", self.described());
+        Failure::new("PrinterRefused", message)
+            .hint("look at the server's own page; is there a proxy or a login before it?")
     }
 
     fn get(&self, path: &str) -> Result<Answer, Failure> {
@@ -235,6 +250,14 @@ impl<'a> PrintServer<'a> {
             _ => Failure::new("PrinterRefused", format!("{place} answers {status}{said}")),
         }
     }
+}
+
+/// What answers to an upload have at least one of, by version and kind of server.
+const STORED: [&str; 5] = ["item", "result", "print_started", "files", "done"];
+
+/// What an answer says; `None` when it is no object of JSON.
+fn object(answer: &Answer) -> Option<Value> {
+    serde_json::from_slice(&answer.body).ok().filter(Value::is_object)
 }
 
 /// What a server says about an error, in at most a line.
