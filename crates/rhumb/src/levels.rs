@@ -35,21 +35,39 @@ pub struct MetFlat {
 pub struct SteppedFlat {
     /// The face.
     pub flat: Flat,
-    /// How far the part goes on above it, mm. Zero for its top, which is left when no curved layer
-    /// would fit below the planar ones.
-    pub below_top: f64,
+    /// Why it is left.
+    pub why: Why,
+}
+
+/// Why curved layers end on a flat face in steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Why {
+    /// No curved layer would fit below the planar ones.
+    NoRoom,
+    /// It lies within the planar layers that curved ones stand on, or too little above.
+    InBase,
+    /// It lies where cones grow out of planes, or too little above.
+    InBlend,
+    /// A flat top at this height is met, mm, and no layer fits between.
+    Near(f64),
+    /// So much that looks down would hang on the planar layers below it, mm².
+    Hangs(f64),
 }
 
 impl SteppedFlat {
     /// Why it is left, in words.
     fn why(&self) -> String {
-        if self.below_top > 0.0 {
-            let above = decimal(self.below_top, 3);
-            format!(
-                "the part goes on {above} mm above it, and the nozzle would reach down beside that"
-            )
-        } else {
-            "no curved layer would fit below the planar ones".into()
+        match self.why {
+            Why::NoRoom => "no curved layer would fit below the planar ones".into(),
+            Why::InBase => "it lies within the base layers, or less than a layer above them".into(),
+            Why::InBlend => "it lies where the layers grow from planes to cones".into(),
+            Why::Near(z) => {
+                format!("no layer fits between it and the flat top at {} mm", decimal(z, 3))
+            }
+            Why::Hangs(area) => format!(
+                "{} mm² of the part look down there and would hang on planar layers",
+                decimal(area, 1)
+            ),
         }
     }
 }

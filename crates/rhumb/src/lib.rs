@@ -43,6 +43,7 @@ pub mod convert;
 pub mod estimate;
 pub mod failure;
 mod filling;
+mod flat_tops;
 pub mod groups;
 pub mod http;
 pub mod input;

@@ -151,7 +151,7 @@ pub fn slice_all(
     let curved = stages.iter().find(|stage| stage.kind != LayerKind::Planar);
     let overhang = curved
         .map(|stage| overhangs(placed.solid.mesh(), &*stage.surface, job.orient.overhang_rad));
-    let layers_kind = stages.last().map_or(LayerKind::Planar, |stage| stage.kind);
+    let layers_kind = curved.map_or(LayerKind::Planar, |stage| stage.kind);
     let schedule_ms = clock.lap();
     let mut job = job.clone();
     job.plan.resample.azimuth = placed.azimuth;

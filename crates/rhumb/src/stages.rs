@@ -3,9 +3,9 @@
 //! A planar print has one. A curved one begins with some planar layers on the bed
 //! (`base_layers`), whose upper side is the floor that the curved layers begin on.
 //!
-//! With `top = planar` the curved layers end below the flat face on top of the part, and planar ones
-//! finish it: the first of them fills the wedges between the curved layers and its own plane, and
-//! the last ends on the face.
+//! With `top = planar` the curved layers end below each flat top, and planar ones finish it: the first
+//! of them fills the wedges between the curved layers and its own plane, and the last ends on the
+//! face. Where the part goes on above, curved layers begin anew on that floor.
 //!
 //! With `blend = morph` cones do not begin as wedges: between base and cones lie layers that are each a
 //! little steeper than the one below, as many as the limits of a layer's thickness ask for.
@@ -30,7 +30,8 @@ use slicer::surface::{Caps, Cone, Extent, Form, LayerSurface, Plane, Spheres, Su
 
 use crate::blend;
 use crate::failure::Failure;
-use crate::levels::{self, Layout, MetFlat, SteppedFlat};
+use crate::flat_tops::{Finish, Slab, Stand, finish};
+use crate::levels::{self, Layout, MetFlat};
 use crate::settings::Job;
 
 /// The surface that layers follow, as the user names it.
@@ -180,63 +181,70 @@ pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure>
     // Where the cones begin on the axis, when they do not begin on the floor.
     let start = blended.as_ref().and_then(|stage| stage.levels.get(stage.printed.end - 1));
     let start = start.map(|last| last.upper);
-    let mut curved = Stage { kind, ..curved(part, surface, (floor, start), job)? };
     let stand = blended.as_ref().map_or(floor, |stage| stage.height_within(extent(part).radius));
-    let below: Vec<Stage> = std::iter::once(base).chain(blended).collect();
-    let all = |more: Vec<Stage>| below.into_iter().chain(more).collect();
-    let top = flat_top(&layout, part).filter(|_| job.planar_top);
-    let Some(finish) = top.and_then(|top| finish(top, stand, job)) else {
-        let stepped = if job.planar_top { stepped(&layout, part, |_| true) } else { Vec::new() };
-        return Ok((all(vec![curved]), Layout { flats: Vec::new(), stepped, ..layout }));
+    let stand = Stand { height: stand, is_blend: blended.is_some() };
+    let finish = if job.planar_top {
+        finish(&layout, part, &*surface, stand, job)
+    } else {
+        Finish::default()
     };
-    let first = &finish.levels[finish.printed.start];
-    curved.ceiling = Some(first.upper - LEAST_WEDGE_SHARE * first.thickness());
+    let met = layout.flats.iter().filter(|met| {
+        met.flat.facing == Facing::Up
+            && finish.slabs.iter().any(|slab| (slab.top - met.flat.z_mm).abs() <= TOP_MM)
+    });
     // The other faces are met by no layer on purpose.
-    let on_top = |met: &&MetFlat| is_top(met, part);
-    let flats = layout.flats.iter().filter(on_top).map(|met| MetFlat { miss: 0.0, ..*met });
-    let (flats, stepped) = (flats.collect(), stepped(&layout, part, |met| !is_top(met, part)));
-    let layout = Layout { flats, stepped, ..layout };
-    Ok((all(vec![curved, finish]), layout))
+    let flats = met.map(|met| MetFlat { miss: 0.0, ..*met }).collect();
+    let layout = Layout { flats, stepped: finish.left, ..layout };
+    let below: Vec<Stage> = std::iter::once(base).chain(blended).collect();
+    Ok((between(part, kind, below, (floor, start), &finish.slabs, job)?, layout))
 }
 
-/// How far a flat face may lie from the highest point of the part and be its top, mm: what its own
-/// vertices differ by.
+/// How far a flat face may lie from the end of a slab and be met by it, mm: what its own vertices differ
+/// by.
 const TOP_MM: f64 = 1e-3;
 
-fn is_top(met: &MetFlat, part: &Mesh) -> bool {
-    met.flat.facing == Facing::Up && (met.flat.z_mm - part.bounds().max.z).abs() <= TOP_MM
-}
-
-/// The flat faces facing up that a print is asked to finish, as far as `is_left` tells.
-fn stepped(layout: &Layout, part: &Mesh, is_left: impl Fn(&MetFlat) -> bool) -> Vec<SteppedFlat> {
-    let faces_up = |met: &&MetFlat| met.wanted && met.flat.facing == Facing::Up && is_left(met);
-    let left = |met: &MetFlat| {
-        let below_top = if is_top(met, part) { 0.0 } else { part.bounds().max.z - met.flat.z_mm };
-        SteppedFlat { flat: met.flat, below_top }
-    };
-    layout.flats.iter().filter(faces_up).map(left).collect()
-}
-
-/// The height of the flat face on top of a part.
-fn flat_top(layout: &Layout, part: &Mesh) -> Option<f64> {
-    layout.flats.iter().find(|met| met.wanted && is_top(met, part)).map(|met| met.flat.z_mm)
-}
-
-/// The planar layers that end at `top`; `None` where no curved layer would fit below them.
-fn finish(top: f64, floor: f64, job: &Job) -> Option<Stage> {
-    let height = job.schedule.layer_height;
-    let skins = &job.paths.skins;
-    let (count, below) = (skins.top_layers.max(1), skins.bottom_layers.max(1));
-    if top - height * (count + LEAST_CURVED) as f64 <= floor {
-        return None;
+/// Puts curved layers on what is there already, and between slabs of planar ones.
+fn between(
+    part: &Mesh,
+    kind: LayerKind,
+    mut all: Vec<Stage>,
+    (mut floor, mut start): (f64, Option<f64>),
+    slabs: &[Slab],
+    job: &Job,
+) -> Result<Vec<Stage>, Failure> {
+    let count = |all: &[Stage]| all.iter().map(|stage| stage.printed.len()).sum::<usize>();
+    for slab in slabs {
+        if slab.on_curved {
+            let ceiling = slab.bottom + (1.0 - LEAST_WEDGE_SHARE) * slab.step();
+            let space = Space { floor, start, ceiling: Some(ceiling), index: count(&all) };
+            all.push(curved(part, kind, &space, job)?);
+        }
+        all.push(planar(slab, count(&all), job));
+        (floor, start) = (slab.top, None);
     }
-    let printed = below..below + count;
-    let bound = |k: usize| top - height * (printed.end as f64 - k as f64);
+    // Above the highest point there is nothing left to do.
+    if part.bounds().max.z > floor + TOP_MM {
+        let space = Space { floor, start, ceiling: None, index: count(&all) };
+        all.push(curved(part, kind, &space, job)?);
+    }
+    Ok(all)
+}
+
+/// The layers of a slab; `index` counts those below.
+fn planar(slab: &Slab, index: usize, job: &Job) -> Stage {
+    let skins = &job.paths.skins;
+    let below = skins.bottom_layers.max(1);
+    let printed = below..below + slab.count;
+    let bound = |k: usize| slab.top - slab.step() * (printed.end as f64 - k as f64);
     let levels = (0..printed.end + skins.top_layers.max(1))
-        .map(|k| Level { index: job.base_layers.max(1) + k, lower: bound(k), upper: bound(k + 1) })
+        .map(|k| Level {
+            index: (index.max(1) + k).saturating_sub(below),
+            lower: bound(k),
+            upper: bound(k + 1),
+        })
         .collect();
     let kind = LayerKind::Planar;
-    Some(Stage {
+    Stage {
         surface: Box::new(Plane),
         kind,
         levels,
@@ -244,11 +252,8 @@ fn finish(top: f64, floor: f64, job: &Job) -> Option<Stage> {
         floor: None,
         ceiling: None,
         morph: None,
-    })
+    }
 }
-
-/// Fewer curved layers than this between floor and planar top are not worth it.
-const LEAST_CURVED: usize = 2;
 
 /// How deep the nozzle may press into what is laid, mm: a quarter of a usual layer, which a soft
 /// bead gives way by.
@@ -397,12 +402,21 @@ fn area_on_level(part: &Mesh, surface: &dyn LayerSurface, level: f64) -> f64 {
         .sum()
 }
 
-fn curved(
-    part: &Mesh,
-    surface: Box<dyn LayerSurface>,
-    (floor, start): (f64, Option<f64>),
-    job: &Job,
-) -> Result<Stage, Failure> {
+/// Where curved layers go.
+struct Space {
+    /// Height of the floor below, mm.
+    floor: f64,
+    /// The level that they begin at, where it is not the floor that they begin on.
+    start: Option<f64>,
+    /// Height that they end at, mm; `None` where the part ends them.
+    ceiling: Option<f64>,
+    /// How many layers are below.
+    index: usize,
+}
+
+fn curved(part: &Mesh, kind: LayerKind, space: &Space, job: &Job) -> Result<Stage, Failure> {
+    let Space { floor, start, ceiling, .. } = *space;
+    let surface = kind.surface().map_err(|error| unfit(&error))?;
     let Extent { radius, .. } = extent(part);
     let top = part.bounds().max.z;
     let level = |r: f64, z: f64| surface.level(&Point3::new(r, 0.0, z));
@@ -419,11 +433,14 @@ fn curved(
         level(0.0, floor).min(level(radius + margin, floor))
     };
     let greatest = part.vertices.iter().map(|p| surface.level(p)).fold(level(0.0, top), f64::max);
+    let below_ceiling = |z: f64| level(0.0, z).max(level(radius, z));
+    let greatest = ceiling.map_or(f64::INFINITY, below_ceiling).min(greatest);
     let step = surface.level_step(job.schedule.layer_height);
     let count = ((greatest - least) / step - WHOLE_LAYER).ceil().max(1.0);
     levels::check_count(count)?;
     // A face that is a layer itself, such as that of a lens, is met by the last one.
     let ends_on_face = job.schedule.snap != Snap::Off
+        && ceiling.is_none()
         && area_on_level(part, &*surface, greatest) >= job.least_flat_mm2.max(LEAST_FACE_MM2);
     let step = if ends_on_face { (greatest - least) / count } else { step };
     let skins = &job.paths.skins;
@@ -432,13 +449,13 @@ fn curved(
     let bound = |k: usize| least + step * (k as f64 - below as f64);
     let levels = (0..printed.end + skins.top_layers.max(1))
         .map(|k| Level {
-            // Only printed layers are counted, after those of the base.
-            index: (job.base_layers + k).saturating_sub(below),
+            // Only printed layers are counted, after those below.
+            index: (space.index + k).saturating_sub(below),
             lower: bound(k),
             upper: bound(k + 1),
         })
         .collect();
     // Cones that go on from a blend have no wedges.
     let floor = if start.is_none() { Some(floor) } else { None };
-    Ok(Stage { surface, kind: job.layers, levels, printed, floor, ceiling: None, morph: None })
+    Ok(Stage { surface, kind, levels, printed, floor, ceiling, morph: None })
 }

@@ -154,7 +154,11 @@ impl Lift<'_> {
         if self.is_even() {
             return Station { at, bead, overhang };
         }
-        let thickness = self.thickness(&at);
+        let thickness = match &self.stair {
+            // The bead lies over edges of curved layers.
+            Some(stair) => stair.mean_thickness(at.x.hypot(at.y), bead.spacing()),
+            None => self.thickness(&at),
+        };
         if thickness == bead.thickness {
             return Station { at, bead, overhang };
         }

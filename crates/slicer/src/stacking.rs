@@ -107,9 +107,34 @@ impl Stair<'_> {
         let steps = ((highest - self.level) / self.step + STEP_SLACK).floor();
         let ground = self.surface.height(self.level + steps * self.step, r);
         let ground = if ground.is_finite() { ground.max(self.floor) } else { self.floor };
-        self.top - ground
+        self.top - ground.max(self.end_face(r, self.level + (steps + 1.0) * self.step))
+    }
+
+    /// Returns the height at distance `r` from the axis of the side on which the layer with this upper
+    /// level ends below the ceiling, mm. The side runs along the normal, so that the foot of the layer
+    /// reaches out under the ceiling.
+    fn end_face(&self, r: f64, level: f64) -> f64 {
+        let ceiling = self.ceiling();
+        let cos = self.surface.slope_cos(&Point3::new(r, 0.0, ceiling));
+        let slope = (1.0 - cos * cos).max(0.0).sqrt() / cos;
+        let aside = (self.surface.height(level, r) - ceiling) / slope;
+        let height = ceiling - aside / slope;
+        if height.is_finite() { height.min(ceiling) } else { f64::NEG_INFINITY }
+    }
+
+    /// Returns the mean of the thickness within half of `width` of distance `r` from the axis, mm: what
+    /// a bead takes that lies on edges of curved layers.
+    #[must_use]
+    pub fn mean_thickness(&self, r: f64, width: f64) -> f64 {
+        let at = |k: u32| r + width * ((f64::from(k) + 0.5) / f64::from(ACROSS) - 0.5);
+        let sum: f64 = (0..ACROSS).map(|k| self.thickness(at(k).abs())).sum();
+        sum / f64::from(ACROSS)
     }
 }
+
+/// Places across a bead at which its ground is looked at: the steps of the stair lie about as far apart
+/// as beads are wide, so that one or two edges run under it.
+const ACROSS: u32 = 12;
 
 /// Rounding of a level, as a share of a step: a layer that just reaches the ceiling is laid.
 const STEP_SLACK: f64 = 1e-6;
@@ -226,14 +251,40 @@ mod tests {
                 let r = f64::from(k) * 0.1;
                 let thickness = stair.thickness(r);
                 let ground = top - thickness;
-                // The ground is a curved layer that is laid, and the next one is not.
+                // The ground is a curved layer that is laid, or the side of the next one, which is not.
                 let level = surface.level(&Point3::new(r, 0.0, ground));
                 let steps = (level - 3.07) / step;
-                assert!((steps - steps.round()).abs() < 1e-6, "{r}: {steps}");
+                let on_layer = (steps - steps.round()).abs() < 1e-6;
+                let next = 3.07 + (steps - 1e-6).ceil() * step;
+                let on_side = (stair.end_face(r, next) - ground).abs() < 1e-6;
+                assert!(on_layer || on_side, "{r}: {steps}");
                 assert!(ground <= stair.ceiling() + 1e-6 && thickness >= least - 1e-6);
-                assert!(surface.height(level + step, r) > stair.ceiling());
+                assert!(surface.height(level + step, r) > stair.ceiling() - 1e-6);
             }
+            // Rings side by side take together what the ground leaves.
+            let (width, inner) = (0.4, 4.0);
+            let ring = |k: u32| inner + width * f64::from(k);
+            let taken: f64 = (0..20).map(|k| stair.mean_thickness(ring(k), width) * width).sum();
+            let fine = |k: u32| inner - width / 2.0 + 1e-3 * (f64::from(k) + 0.5);
+            let left: f64 = (0..8000).map(|k| stair.thickness(fine(k)) * 1e-3).sum();
+            assert!((taken / left - 1.0).abs() < 0.01, "{taken} {left}");
         }
+        // On a cone all layers end alike: half a layer upright is missing on the mean below the ceiling,
+        // less the feet, right triangles over the side of a layer.
+        let (sin, cos) = 0.5_f64.sin_cos();
+        let stair = Stair {
+            surface: &cone,
+            level: 3.07,
+            step: 0.2 / cos,
+            floor: 0.4,
+            top: 12.0,
+            least: 0.1,
+        };
+        let (inner, terrace) = (4.0, 0.2 / sin);
+        let at = |k: u32| inner + terrace * 5.0 * (f64::from(k) + 0.5) / 5000.0;
+        let mean = (0..5000).map(|k| stair.thickness(at(k))).sum::<f64>() / 5000.0;
+        let wanted = 0.1 + 0.1 / cos - 0.1 * sin * sin / cos;
+        assert!((mean / wanted - 1.0).abs() < 1e-3, "{mean} {wanted}");
         // The highest layer below the ceiling would lie 0.23 mm high, under the floor.
         let low = Stair { surface: &cone, level: 0.6, step: 0.5, floor: 0.4, top: 0.7, least: 0.1 };
         assert!((low.thickness(8.0) - 0.3).abs() < 1e-12, "there is nothing below the floor");

@@ -93,7 +93,11 @@ pub(super) fn joined(
             return Vec::new();
         };
         let beside = at_end[end.0][end.1].iter().map(|&index| &joins[index]);
-        free_end_share(&rings[rim.ring], &rim, end, beside)
+        let ring = &rings[rim.ring];
+        if at_end[end.0][end.1].is_empty() {
+            return only_end_share(ring, &rim, &chords[end.0], end.1);
+        }
+        free_end_share(ring, &rim, end, beside)
     };
     // Ties go by the order of the chords, which comes from the geometry alone.
     let mut by_length = joins.clone();
@@ -326,6 +330,25 @@ fn free_end_share<'a>(
         return Vec::new();
     }
     along_rim(ring, rim, share, ahead > behind)
+}
+
+/// The rim that belongs to the only end on a ring: a line that winds round it lies farther and farther
+/// off, and after a turn a whole spacing. The second half of that turn is the rim's.
+fn only_end_share(
+    ring: &[Point2<f64>],
+    rim: &RimPoint,
+    chord: &Chord,
+    end: usize,
+) -> Vec<Point2<f64>> {
+    let side = ring[(rim.side + 1) % ring.len()] - ring[rim.side];
+    let beside = |k: usize| match end {
+        0 => chord.points.get(k),
+        _ => chord.points.len().checked_sub(k + 1).and_then(|k| chord.points.get(k)),
+    };
+    let (Some(at), Some(next)) = (beside(0), beside(1)) else { return Vec::new() };
+    let around: f64 =
+        (0..ring.len()).map(|k| distance(&ring[k], &ring[(k + 1) % ring.len()])).sum();
+    along_rim(ring, rim, around / 2.0, side.dot(&(next - at)) < 0.0)
 }
 
 /// Pieces of rim shorter than this are not worth a move, mm.

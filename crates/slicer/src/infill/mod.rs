@@ -200,19 +200,81 @@ pub fn fill(skins: &Skins, layer: &FillLayer<'_>, params: &InfillParams) -> Fill
     let mut filling = Filling::default();
     let angle = angle_in(layer, params);
     let (inner, top) = (params.solid_pattern, params.top_pattern);
-    for (region, role, width, pattern) in [
-        (&skins.solid, Role::SolidInfill, params.solid_width, inner),
-        (&skins.top, Role::TopSolidInfill, params.top_width, top),
-    ] {
-        let solid = Solid { role, width, pattern, angle };
-        for island in region.islands() {
-            solid.fill(island, layer, &mut filling);
+    let solids = [
+        (
+            &skins.solid,
+            Solid { role: Role::SolidInfill, width: params.solid_width, pattern: inner, angle },
+        ),
+        (
+            &skins.top,
+            Solid { role: Role::TopSolidInfill, width: params.top_width, pattern: top, angle },
+        ),
+    ];
+    if !fill_as_one(&solids, layer, &mut filling) {
+        for (region, solid) in &solids {
+            for island in region.islands() {
+                solid.fill(island, layer, &mut filling);
+            }
         }
     }
     if params.density > 0.0 && !skins.sparse.is_empty() {
         filling.lines.extend(sparse::fill(&skins.sparse, layer, params));
     }
     filling
+}
+
+/// Fills two solid areas that lie side by side with turns of the same spiral, which go on from one to the
+/// other: each ended on its own they would leave a groove between. The narrower lines are laid in both.
+/// Returns whether it did.
+fn fill_as_one(
+    solids: &[(&Region, Solid); 2],
+    layer: &FillLayer<'_>,
+    filling: &mut Filling,
+) -> bool {
+    let [(solid, how), (top, top_how)] = solids;
+    let is_spiral = |how: &Solid| how.pattern_on(layer) == SolidPattern::Archimedean;
+    let width = how.width.min(top_how.width);
+    let are_alike = how.width.max(top_how.width) <= MOST_ALIKE * width;
+    if !(is_spiral(how) && is_spiral(top_how) && are_alike) || solid.is_empty() || top.is_empty() {
+        return false;
+    }
+    // Rounded corners of a border leave cracks that no bead could be laid beside.
+    let whole = solid.union(&top.outset(CRACK_MM));
+    for island in whole.islands() {
+        let area = Region::from_island(island.clone());
+        let Some(lines) = (Solid { width, ..*how }).turns(&area, layer) else {
+            for (part, how) in solids {
+                for island in part.intersection(&area).islands() {
+                    how.fill(island, layer, filling);
+                }
+            }
+            continue;
+        };
+        filling.lines.extend(lines.iter().flat_map(|line| shared_out(line, top, top_how.role)));
+    }
+    true
+}
+
+/// Lines of two areas that differ by no more than this in width can be laid alike.
+const MOST_ALIKE: f64 = 1.25;
+
+/// Wider than any crack between areas that were cut apart on the grid, mm, and far less than beads are
+/// placed to.
+const CRACK_MM: f64 = 1e-4;
+
+/// A line taken apart where it enters or leaves `other`, and what lies there given its role. Points of a
+/// spiral lie near enough to each other for the middle of a side to tell.
+fn shared_out(line: &FillLine, other: &Region, role: Role) -> Vec<FillLine> {
+    let mut parts: Vec<FillLine> = Vec::new();
+    for side in line.points.windows(2) {
+        let is_other = other.contains(&nalgebra::center(&side[0], &side[1]));
+        let role = if is_other { role } else { line.role };
+        match parts.last_mut() {
+            Some(part) if part.role == role => part.points.push(side[1]),
+            _ => parts.push(FillLine { role, points: side.to_vec(), ..line.clone() }),
+        }
+    }
+    parts
 }
 
 /// Returns parallel lines across an area, `spacing` mm apart, from rim to rim.
@@ -278,11 +340,7 @@ impl Solid {
     fn fill(&self, island: &Island, layer: &FillLayer<'_>, filling: &mut Filling) {
         let bead = Bead { width: self.width, thickness: layer.thickness };
         let area = Region::from_island(island.clone());
-        // Straight lines of a curved chart are not equally far apart everywhere; turns of the
-        // spiral are.
-        let pattern =
-            if layer.chart.is_flat() { self.pattern } else { self.pattern.evenly_curved() };
-        match pattern {
+        match self.pattern_on(layer) {
             SolidPattern::Rectilinear => {
                 let even = rectilinear::evenly(&area, bead.spacing(), self.angle);
                 let bead = Bead::with_spacing(even.spacing, layer.thickness);
@@ -303,18 +361,30 @@ impl Solid {
         }
     }
 
+    /// Straight lines of a curved chart are not equally far apart everywhere; turns of the spiral are.
+    fn pattern_on(&self, layer: &FillLayer<'_>) -> SolidPattern {
+        if layer.chart.is_flat() { self.pattern } else { self.pattern.evenly_curved() }
+    }
+
     fn spiral(&self, area: &Region, bead: Bead, layer: &FillLayer<'_>, filling: &mut Filling) {
+        match self.turns(area, layer) {
+            Some(lines) => filling.lines.extend(lines),
+            // Too narrow for turns of a fixed pitch: loops follow the outline instead.
+            None => concentric(area, self.role, bead, layer, filling),
+        }
+    }
+
+    /// Turns of the spiral that take the volume of an area; `None` where they would not.
+    fn turns(&self, area: &Region, layer: &FillLayer<'_>) -> Option<Vec<FillLine>> {
+        let bead = Bead { width: self.width, thickness: layer.thickness };
         let core = layer.chart.inset(area, bead.spacing() / 2.0);
         // Turns of neighbouring layers lie in each other's grooves.
         let phase = if layer.index.is_multiple_of(2) { 0.0 } else { std::f64::consts::PI };
         let turning = turning(layer.index);
         let chords = spiral::chords(&core, bead.spacing(), phase, turning, layer.tolerance);
         let lines = open_lines(&core, &chords, &SOLID_JOINS, self.role, bead, layer);
-        match balanced(&lines, area, layer) {
-            Some(bead) => filling.lines.extend(lines.into_iter().map(|l| FillLine { bead, ..l })),
-            // Too narrow for turns of a fixed pitch: loops follow the outline instead.
-            None => concentric(area, self.role, bead, layer, filling),
-        }
+        let bead = balanced(&lines, area, layer)?;
+        Some(lines.into_iter().map(|line| FillLine { bead, ..line }).collect())
     }
 }
 
@@ -495,6 +565,61 @@ mod tests {
                     };
                     assert!((ratio - 1.0).abs() < slack, "{pattern:?}, area {k}: {ratio}");
                 }
+            }
+        }
+    }
+
+    /// The greatest distance of a place of an area from the lines in it, mm.
+    fn widest_groove(area: &Region, filling: &Filling) -> f64 {
+        let bounds = area.bounds().unwrap();
+        let (low, high) = (geom::grid::mm(bounds.min), geom::grid::mm(bounds.max));
+        let sides: Vec<[Point2<f64>; 2]> = filling
+            .lines
+            .iter()
+            .flat_map(|line| line.points.windows(2).map(|w| [w[0], w[1]]))
+            .collect();
+        let distance = |p: &Point2<f64>| {
+            let to = |[a, b]: &[Point2<f64>; 2]| {
+                let along = b - a;
+                let share = (p - a).dot(&along) / along.norm_squared();
+                (p - (a + along * share.clamp(0.0, 1.0))).norm()
+            };
+            sides.iter().map(to).fold(f64::MAX, f64::min)
+        };
+        let count = 160;
+        let at = |k: usize, low: f64, high: f64| low + (high - low) * k as f64 / count as f64;
+        let places = (0..count * count)
+            .map(|k| Point2::new(at(k % count, low.x, high.x), at(k / count, low.y, high.y)));
+        places.filter(|p| area.contains(p)).map(|p| distance(&p)).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn turns_leave_no_groove_round_the_axis() {
+        let about_axis = |radius: f64| {
+            let at = |i: i32| f64::from(i) * TAU / 200.0;
+            let ring: Vec<[f64; 2]> =
+                (0..200).map(|i| [radius * at(i).cos(), radius * at(i).sin()]).collect();
+            polygon(&ring)
+        };
+        let cone = Cone::new(0.3).unwrap();
+        let chart = cone.chart(9.0);
+        let layer = FillLayer { surface: &cone, chart, level: 9.0, ..LAYER };
+        let params = InfillParams { top_width: 0.4, ..PARAMS };
+        for k in 0..6_u32 {
+            let middle = 6.0 + 0.07 * f64::from(k);
+            for index in 0..2 {
+                let layer = FillLayer { index, ..layer };
+                let ring = about_axis(9.0).difference(&about_axis(3.0));
+                let top = ring.intersection(&about_axis(middle));
+                let solid = ring.difference(&about_axis(middle));
+                let skins = Skins { top, solid, ..Skins::default() };
+                let filling = fill(&skins, &layer, &params);
+                // At walls half a turn ends on them.
+                let between = about_axis(8.0).difference(&about_axis(4.0));
+                let groove = widest_groove(&between, &filling);
+                assert!(groove < 0.3, "{middle} {index}: {groove}");
+                let ratio = laid(&filling) / ring.area();
+                assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
             }
         }
     }
