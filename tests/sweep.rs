@@ -1,11 +1,13 @@
 //! Any settings with any model: random ones by a fixed rule, through the slice and its check. 40 of
 //! them, or as many as `RHUMB_SWEEP` says, from `RHUMB_SWEEP_FROM` on.
 
+use std::collections::BTreeMap;
+
 use mesh::mesh::Mesh;
 use mesh::shapes;
 use serde_json::Value;
 
-use crate::run::Scratch;
+use crate::run::{Scratch, say};
 
 /// A sequence of numbers that look random (splitmix64).
 struct Random(u64);
@@ -141,6 +143,12 @@ fn fault(code: Option<i32>, out: &str, err: &str) -> Option<String> {
     }
 }
 
+/// The class of a refusal.
+fn class(err: &str) -> String {
+    let class = err.strip_prefix("error[").and_then(|rest| rest.split(']').next());
+    class.unwrap_or("none").to_owned()
+}
+
 fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
 }
@@ -149,6 +157,7 @@ fn number(name: &str, otherwise: u64) -> u64 {
 fn any_settings_with_any_model_give_a_sound_program_or_a_reason() {
     let from = number("RHUMB_SWEEP_FROM", 0);
     let (mut faults, mut n_printed) = (Vec::new(), 0);
+    let mut refused = BTreeMap::<String, Vec<u64>>::new();
     let count = number("RHUMB_SWEEP", 40);
     for seed in from..from + count {
         let mut random = Random(seed);
@@ -159,11 +168,17 @@ fn any_settings_with_any_model_give_a_sound_program_or_a_reason() {
             ["slice", "m.stl", "-o", "x.gcode", "--json"].map(String::from).to_vec();
         all.extend(more.iter().cloned());
         let ran = scratch.run(&all);
-        n_printed += u64::from(matches!(ran.code, Some(0 | 1)));
+        match ran.code {
+            Some(0 | 1) => n_printed += 1,
+            _ => refused.entry(class(&ran.err)).or_default().push(seed),
+        }
         if let Some(fault) = fault(ran.code, &ran.out, &ran.err) {
-            faults.push(format!("seed {seed}: {fault}\n  {}", more.join(" ")));
+            let kept = format!("{}/sweep-{seed}.stl", env!("CARGO_TARGET_TMPDIR"));
+            std::fs::copy(scratch.path("m.stl"), &kept).unwrap();
+            faults.push(format!("seed {seed}: {fault}\n  {kept} {}", more.join(" ")));
         }
     }
-    assert!(n_printed * 2 > count, "only {n_printed} of {count} are printed");
+    say(&format!("{n_printed} of {count} are printed; refused are {refused:?}"));
     assert!(faults.is_empty(), "{} of {count}:\n{}", faults.len(), faults.join("\n"));
+    assert!(n_printed * 2 > count, "only {n_printed} of {count} are printed: {refused:?}");
 }

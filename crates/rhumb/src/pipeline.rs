@@ -22,7 +22,7 @@ use plan::planner::{Planner, Totals};
 use slicer::layer::{Filled, Floating};
 use slicer::level::Level;
 use slicer::section::Tears;
-use slicer::toolpath::LostArea;
+use slicer::toolpath::{LayerPaths, LostArea};
 use twin::picture::thumbnail::Thumbnail;
 
 use crate::choice::{Choice, choose};
@@ -306,6 +306,10 @@ struct Printed {
     /// Islands that begin in mid-air, with their layer; places in the frame that turns with the part.
     floating: Vec<(usize, Floating)>,
     adhesion_out_of_reach: usize,
+    /// Planes without a bead of the part, and the height of the first, mm: those that nothing was laid
+    /// above yet, and those that something was.
+    empty: (usize, f64),
+    gaps: (usize, f64),
     /// The layers that were printed.
     levels: Vec<Level>,
     /// Their thickness along the normal, mm.
@@ -386,8 +390,12 @@ impl Printing<'_, '_, '_> {
         }
         for (k, mut filled) in batch.window.zip(batch.layers) {
             self.progress.advance(1);
+            let stands_on_bed = batch.stage == 0 && stage.kind == LayerKind::Planar;
+            if stands_on_bed {
+                self.printed.count_empty(&filled.paths, &stage.levels[k]);
+            }
             // Layers of one stage may pass beside the part, above or below it.
-            if filled.paths.is_empty() && is_one_of_many {
+            if filled.paths.is_empty() && is_one_of_many && !stands_on_bed {
                 continue;
             }
             if stage.morph.is_some() {
@@ -499,6 +507,22 @@ impl Printed {
         self.tears.dropped_length += tears.dropped_length;
     }
 
+    /// Counts layers without a bead that others lie above: these begin in mid-air.
+    fn count_empty(&mut self, paths: &LayerPaths, level: &Level) {
+        if paths.lays_part() {
+            let (count, first) = std::mem::take(&mut self.empty);
+            if self.gaps.0 == 0 {
+                self.gaps.1 = first;
+            }
+            self.gaps.0 += count;
+            return;
+        }
+        if self.empty.0 == 0 {
+            self.empty.1 = level.upper;
+        }
+        self.empty.0 += 1;
+    }
+
     fn count(&mut self, filled: &Filled, level: &Level) {
         let index = self.levels.len();
         self.levels.push(Level { index, ..*level });
@@ -525,6 +549,16 @@ impl Printed {
                     "{:.2} mm³ are thinner than {} mm and stay empty; the largest such place has \
                      {:.3} mm²",
                     self.lost_volume, job.paths.thin.least_width, self.lost.worst_area
+                ),
+            );
+        }
+        if let (count @ 1.., first) = self.gaps {
+            warn(
+                "EmptyLayers",
+                format!(
+                    "no bead fits into {count} of the layers, the first at z {first:.2} mm: what is \
+                     above begins in mid-air; turn the part (--orient), cut it (--cut), or print more \
+                     walls"
                 ),
             );
         }

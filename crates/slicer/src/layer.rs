@@ -442,7 +442,7 @@ impl Thick<'_> {
         }
         let frame = Frame::of(&self.lift);
         let layer = FillLayer { index: self.index, ..frame.fill_layer(params) };
-        let lines = infill::sparse::fill(&region, &layer, &params.infill);
+        let lines = infill::sparse_lines(&region, &layer, &params.infill);
         let role = Role::CombinedInfill;
         lines.into_iter().map(|line| frame.fill(&FillLine { role, ..line })).collect()
     }

@@ -171,12 +171,17 @@ impl LayerPaths {
     /// Returns whether nothing is laid.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        let is_empty = |island: &IslandPaths| {
-            island.fills.is_empty()
-                && island.in_order.is_empty()
-                && island.walls.iter().all(|group| group.loops.is_empty())
-        };
-        self.adhesion.is_empty() && self.supports.is_empty() && self.islands.iter().all(is_empty)
+        self.adhesion.is_empty() && self.supports.is_empty() && !self.lays_part()
+    }
+
+    /// Returns whether something of the part is laid.
+    #[must_use]
+    pub fn lays_part(&self) -> bool {
+        self.islands.iter().any(|island| {
+            !island.fills.is_empty()
+                || !island.in_order.is_empty()
+                || island.walls.iter().any(|group| !group.loops.is_empty())
+        })
     }
 }
 

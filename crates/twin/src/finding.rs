@@ -152,6 +152,26 @@ impl Findings {
         1
     }
 
+    /// Returns whether nothing was found.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.counts.is_empty()
+    }
+
+    /// Adds what a check found by itself, after all that it found before.
+    pub(crate) fn append(&mut self, own: Self) {
+        for count in own.counts {
+            match self
+                .counts
+                .iter_mut()
+                .find(|c| (c.check, c.severity) == (count.check, count.severity))
+            {
+                Some(known) => known.count += count.count,
+                None => self.counts.push(count),
+            }
+        }
+        self.kept.extend(own.kept);
+    }
+
     /// Returns the findings that were kept, by line, and the counts of those that were not.
     pub(crate) fn into_parts(mut self) -> (Vec<Finding>, Vec<Omitted>) {
         // Stable: findings of one line stay in the order of the checks.

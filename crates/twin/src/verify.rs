@@ -232,8 +232,10 @@ impl<'a> Verifier<'a> {
         let enclosed = self
             .setup
             .mesh
-            .map(|mesh| || Enclosed { volume: volume(mesh), surface: surface(mesh) });
-        let unjudged = self.volume.end(enclosed, self.setup.solid, &mut self.findings);
+            .map(|mesh| |families: &[Family], thickness: f64| enclosed(mesh, families, thickness));
+        let mesh = self.setup.mesh;
+        let is_open = || mesh.is_some_and(has_holes);
+        let unjudged = self.volume.end(enclosed, is_open, self.setup.solid, &mut self.findings);
         let mut notes: Vec<&'static str> = unjudged.into_iter().collect();
         if self.setup.dialect.space == Space::Part {
             notes.push(
@@ -463,4 +465,29 @@ impl<'a> Verifier<'a> {
             thorough: None,
         }
     }
+}
+/// What a mesh holds, for layers of some families and this thickness, mm.
+///
+/// A ball of radius R leaves the layer that touches it by one thickness t where it leans by √(2t/R);
+/// what leans more is met by so many layers that their errors cancel. R is that of the ball with this
+/// surface.
+fn enclosed(mesh: &Mesh, families: &[Family], thickness: f64) -> Enclosed {
+    let surface = surface(mesh);
+    let radius = (surface / (4.0 * std::f64::consts::PI)).sqrt();
+    let reach = 2.0 * thickness / radius;
+    let along = mesh.triangles.iter().filter_map(|corners| {
+        let [a, b, c] = corners.map(|k| mesh.vertices.get(k as usize).copied());
+        let (a, b, c) = (a?, b?, c?);
+        let (area, centre) = ((b - a).cross(&(c - a)) / 2.0, (a + b.coords + c.coords) / 3.0);
+        let leaning = |family: &Family| family.normal(&centre).cross(&area).norm() / area.norm();
+        let least = families.iter().map(leaning).fold(1.0, f64::min);
+        let share = (reach / (least * least)).min(1.0);
+        share.is_finite().then_some(share * area.norm())
+    });
+    Enclosed { volume: volume(mesh), surface, along: along.sum() }
+}
+
+/// Whether some side of a facet has no other; a mesh that is none has no sides to ask for.
+fn has_holes(mesh: &Mesh) -> bool {
+    mesh.check().is_ok() && mesh::topology::Solid::new(mesh.clone()).open_sides() > 0
 }

@@ -56,6 +56,9 @@ pub(super) enum ReadError {
     /// A feed rate that never arrives.
     #[error("F must be above 0, not {0}")]
     Feed(f64),
+    /// More filament than there is.
+    #[error("{0:.3e} mm of filament in one line")]
+    Filament(f64),
     /// A byte that no firmware reads.
     #[error("there is a NUL in the line")]
     Nul,
@@ -115,6 +118,13 @@ const FIRST_SPEED_MM_S: f64 = 25.0;
 
 /// Filament moves alone in pieces shorter than this, mm: Klipper refuses 50.
 const LONGEST_FILAMENT_MM: f64 = 49.0;
+
+/// Most filament in a line, mm: a third of a usual spool. Each piece of it is a move of its own.
+const MOST_FILAMENT_MM: f64 = 1e5;
+
+/// Most filament for each millimetre of a line, mm. More cannot go with the motion: at the slowest `F`
+/// there is, 0.1 mm/min, the extruder would be too fast. It goes before.
+const MOST_FILAMENT_PER_MM: f64 = 1e4;
 
 impl Reader {
     /// Returns a reader before the first line; the nozzle stands at `home` in the part.
@@ -257,6 +267,9 @@ impl Reader {
         }
         let to = self.target(command);
         let filament = self.fed(command);
+        if filament.abs() > MOST_FILAMENT_MM {
+            return Err(ReadError::Filament(filament));
+        }
         let is_arc = self.motion > 1;
         if to == self.at && filament == 0.0 && !is_arc {
             return Ok(());
@@ -314,18 +327,23 @@ impl Reader {
 
     fn straight(&mut self, to: Point3<f64>, filament: f64, strokes: &mut Vec<Stroke>) {
         let speed = self.speed;
-        if to == self.at {
+        let is_alone =
+            to == self.at || filament.abs() > MOST_FILAMENT_PER_MM * (to - self.at).norm();
+        if is_alone {
             let pieces = (filament.abs() / LONGEST_FILAMENT_MM).ceil().max(1.0);
             let stroke = Stroke {
                 kind: Kind::Filament,
-                to,
+                to: self.at,
                 filament: filament / pieces,
                 speed,
                 continues: false,
             };
             strokes.extend(std::iter::repeat_n(stroke, pieces as usize));
+        }
+        if to == self.at {
             return;
         }
+        let filament = if is_alone { 0.0 } else { filament };
         let kind = if filament > 0.0 { Kind::Print } else { Kind::Travel };
         strokes.push(Stroke { kind, to, filament, speed, continues: false });
         self.at = to;
@@ -469,6 +487,22 @@ mod tests {
         let fed: f64 = strokes.iter().map(|stroke| stroke.filament).sum();
         assert!((fed - 2.0).abs() < 1e-12 && strokes.len() > 50);
         assert_eq!(strokes.last().unwrap().to.xy(), nalgebra::Point2::new(10.0, 0.0));
+    }
+
+    /// A number that a spool does not hold must not become as many moves; found by fuzzing.
+    #[test]
+    fn filament_without_measure_is_refused_or_fed_before_the_move() {
+        let mut reader = Reader::new(Vector2::zeros(), Point3::origin(), 0.01);
+        for line in ["G1 E99999999999999", "G1 X5 E100000", "G1 X20 E1666666666666666666666666666"]
+        {
+            let mut strokes = Vec::new();
+            let read = reader.line(line, &mut strokes).map(|_| ());
+            assert!(strokes.len() < 10_000, "{line}");
+            assert_eq!(read.is_err(), !line.ends_with("E100000"), "{line}: {read:?}");
+        }
+        let (strokes, _) = read("M83\nG1 X100 Y100 F6000\nG1 X100.0001 E20");
+        let kinds: Vec<Kind> = strokes[1..].iter().map(|stroke| stroke.kind).collect();
+        assert_eq!(kinds, [Kind::Filament, Kind::Travel]);
     }
 
     #[test]

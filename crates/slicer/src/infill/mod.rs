@@ -16,7 +16,7 @@ pub(crate) mod ironing;
 mod link;
 mod monotonic;
 mod rectilinear;
-pub(crate) mod sparse;
+mod sparse;
 mod spiral;
 pub(crate) mod support;
 
@@ -180,6 +180,10 @@ impl FillLayer<'_> {
 /// Lines shorter than this many widths are blobs and are left out.
 const LEAST_LENGTH_IN_WIDTHS: f64 = 0.5;
 
+/// Least share of its cross-section that a sparse line keeps where there is little room: a thread that
+/// is thinner tears.
+const LEAST_FLOW: f64 = 0.5;
+
 /// In a solid area joins are part of the filling, however long.
 const SOLID_JOINS: JoinParams = JoinParams { longest: f64::INFINITY, fill_rim: true };
 
@@ -218,7 +222,7 @@ pub fn fill(skins: &Skins, layer: &FillLayer<'_>, params: &InfillParams) -> Fill
         }
     }
     if params.density > 0.0 && !skins.sparse.is_empty() {
-        filling.lines.extend(sparse::fill(&skins.sparse, layer, params));
+        filling.lines.extend(sparse_lines(&skins.sparse, layer, params));
     }
     filling
 }
@@ -275,6 +279,36 @@ fn shared_out(line: &FillLine, other: &Region, role: Role) -> Vec<FillLine> {
         }
     }
     parts
+}
+
+/// Fills an area with sparse lines.
+pub(crate) fn sparse_lines(
+    area: &Region,
+    layer: &FillLayer<'_>,
+    params: &InfillParams,
+) -> Vec<FillLine> {
+    let mut lines = sparse::fill(area, layer, params);
+    make_room(&mut lines, area, layer);
+    lines
+}
+
+/// Makes sparse lines narrower, all alike, where they would lay more than their area holds: lines of
+/// dense patterns cross each other, and joins along the rim take room too.
+fn make_room(lines: &mut [FillLine], area: &Region, layer: &FillLayer<'_>) {
+    let length = |line: &FillLine| {
+        let pairs = line.points.windows(2).map(|w| layer.chart.length(&w[0], &w[1])).sum::<f64>();
+        let close = match (line.closed, line.points.first(), line.points.last()) {
+            (true, Some(first), Some(last)) => layer.chart.length(last, first),
+            _ => 0.0,
+        };
+        pairs + close
+    };
+    let laid: f64 = lines.iter().map(|line| length(line) * line.bead.area()).sum();
+    let room = layer.chart.area(area) * layer.thickness;
+    if laid > room {
+        let flow = (room / laid).max(LEAST_FLOW);
+        lines.iter_mut().for_each(|line| line.bead = line.bead.with_flow(flow));
+    }
 }
 
 /// Returns parallel lines across an area, `spacing` mm apart, from rim to rim.

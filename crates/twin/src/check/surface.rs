@@ -13,6 +13,8 @@
 //! multiple of it where curved layers pass beside the part and are left out. The first layer lies
 //! its thickness above the bed.
 //!
+//! Planes that are announced and hold nothing are told, where something follows: it begins in mid-air.
+//!
 //! Walls that begin and end in a slope, as announced, lie within their layer: at most its thickness
 //! below its surface.
 //!
@@ -50,6 +52,8 @@ pub(crate) struct Surface {
     samples: Vec<Sample>,
     /// The layer before: its family and level.
     last: Option<(Family, f64)>,
+    /// Planes without material since then.
+    n_empty: usize,
     worst: f64,
 }
 
@@ -72,6 +76,7 @@ impl Surface {
             mark: None,
             samples: Vec::new(),
             last: None,
+            n_empty: 0,
             worst: 0.0,
         }
     }
@@ -107,7 +112,11 @@ impl Surface {
     /// Judges the layer that ends.
     pub(crate) fn end_of_layer(&mut self, findings: &mut Findings) {
         let Some(mark) = self.mark else { return };
-        let Some(level) = median(&self.samples) else { return };
+        let Some(level) = median(&self.samples) else {
+            self.empty(&mark);
+            return;
+        };
+        self.after_empty(&mark, findings);
         let severity = if mark.family.is_some() { Severity::Error } else { Severity::Warning };
         let family = mark.family.unwrap_or_default();
         if mark.climbs {
@@ -133,6 +142,31 @@ impl Surface {
         }
         self.step(&mark, level, severity, findings);
         self.last = Some((family, level));
+    }
+
+    /// Takes note of a plane that was announced and holds nothing: the next lies above it.
+    fn empty(&mut self, mark: &LayerMark) {
+        let is_plane = mark.family.unwrap_or_default() == Family::Planar;
+        let (true, Some(height)) = (is_plane, mark.height) else { return };
+        let below = match self.last {
+            None => 0.0,
+            Some((Family::Planar, below)) => below,
+            // Planes on a curved stage begin where they begin.
+            Some(_) => return,
+        };
+        self.last = Some((Family::Planar, below + height));
+        self.n_empty += 1;
+    }
+
+    /// Tells that a layer has nothing below it but layers that hold nothing.
+    fn after_empty(&mut self, mark: &LayerMark, findings: &mut Findings) {
+        let count = std::mem::take(&mut self.n_empty);
+        if count > 0 {
+            let place = Place::line(mark.line, Some(mark.index));
+            findings.warning(NAME, place, (count as f64, 0.0), || {
+                format!("the layer begins in mid-air: nothing was laid in {count} below it")
+            });
+        }
     }
 
     /// Judges a layer that climbs in one turn: it takes the height of one layer.
@@ -200,6 +234,32 @@ mod tests {
     use crate::sample::{part_segment, printer};
 
     const CONE: Family = Family::Conical { slope: 0.5 };
+
+    /// A plane without material is told when something lies above it, and is no gap.
+    #[test]
+    fn what_begins_above_an_empty_layer_is_in_mid_air() {
+        let (mut check, mut findings) = (Surface::new(&printer()), Findings::default());
+        let mark = |index: usize| LayerMark {
+            line: 10 * index,
+            index,
+            top: Some(0.0),
+            height: Some(0.2),
+            family: Some(Family::Planar),
+            climbs: false,
+        };
+        for index in 0..4 {
+            check.layer(mark(index));
+            if index == 2 {
+                let at = |x: f64| Point3::new(x, 1.0, 0.6);
+                let mut segment = part_segment(at(12.0), at(12.5));
+                (segment.filament, segment.role) = (0.1, Role::Perimeter);
+                check.segment(&segment);
+            }
+            check.end_of_layer(&mut findings);
+        }
+        let found: Vec<_> = findings.kept().iter().map(|f| (f.line, f.severity)).collect();
+        assert_eq!(found, [(20, Severity::Warning)]);
+    }
 
     /// Layers of four lines each at these levels, the third line of the last raised by `raised`.
     fn found(family: Option<Family>, levels: &[f64], raised: f64) -> (Vec<f64>, f64) {

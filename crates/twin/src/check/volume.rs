@@ -12,9 +12,13 @@
 //!   the edges of its outermost beads: a bead's side is a half circle, which leaves
 //!   `h²·(1 − π/4)/2` of the outline's square corner empty.
 //!
+//! A mesh with holes encloses nothing for certain, and its sections have no certain area: where it does
+//! not fit what is laid, that is said and is no finding.
+//!
 //! Curved layers, and those in which the nozzle leaves its plane, cannot be told by a plane section;
 //! then only the print as a whole is compared, with the volume that the mesh encloses, and its
-//! surface stands for the outlines. Shells that
+//! surface stands for the outlines, and half a layer on what runs along the layers for their stairs: there a
+//! layer is laid whole or not at all, as its middle has it, which no section shows. Shells that
 //! overlap are counted as often as they do (see [`crate::section`]).
 //!
 //! mm, mm², mm³. Part frame.
@@ -23,6 +27,7 @@ use std::f64::consts::FRAC_PI_4;
 
 use machine::program::Role;
 
+use crate::family::Family;
 use crate::finding::{Findings, Place, exceeds};
 use crate::replay::LayerMark;
 use crate::rounding;
@@ -43,6 +48,10 @@ pub const PRINT_SHARE: f64 = 0.02;
 /// How far the laid outline may lie beyond the section's, mm: chord (0.005), simplification
 /// (0.002), the last places (0.001), and room for what they do together.
 pub const BORDER: f64 = 0.01;
+
+/// Families whose surfaces are compared with that of the mesh. Blends announce one with each layer, and
+/// the first and steepest tell the others.
+const MOST_FAMILIES: usize = 32;
 
 /// What one layer holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,6 +84,8 @@ pub(crate) struct Volume {
     /// How far outlines may lie from those of the mesh, mm.
     border: f64,
     layers: Vec<LayerVolume>,
+    /// Families of layers that were announced, the first [`MOST_FAMILIES`].
+    families: Vec<Family>,
     /// Filament by role, in the order of [`Role::ALL`], mm.
     by_role: [f64; Role::ALL.len()],
     filament: f64,
@@ -85,7 +96,15 @@ impl Volume {
     #[must_use]
     pub(crate) fn new(filament_area: f64, nozzle: f64) -> Self {
         let by_role = [0.0; Role::ALL.len()];
-        Self { filament_area, nozzle, border: BORDER, layers: Vec::new(), by_role, filament: 0.0 }
+        Self {
+            filament_area,
+            nozzle,
+            border: BORDER,
+            layers: Vec::new(),
+            families: Vec::new(),
+            by_role,
+            filament: 0.0,
+        }
     }
 
     /// Allows for outlines that are moved by as much on purpose, mm.
@@ -132,6 +151,10 @@ impl Volume {
 
     /// Begins a layer, with the section at its middle when there is a mesh.
     pub(crate) fn layer(&mut self, mark: LayerMark, section: Option<&Section>) {
+        let family = mark.family.unwrap_or_default();
+        if self.families.len() < MOST_FAMILIES && self.families.last() != Some(&family) {
+            self.families.push(family);
+        }
         self.layers.push(LayerVolume {
             index: mark.index,
             line: mark.line,
@@ -163,11 +186,34 @@ impl Volume {
         Role::ALL.map(|role| (role, self.by_role[role_index(role)] * self.filament_area))
     }
 
-    /// Compares with the mesh, which holds what `enclosed` says; `is_solid` when the print is
-    /// meant to be. Returns what could not be judged.
+    /// Compares with the mesh, which holds what `enclosed` says and has holes if `is_open`; `is_solid`
+    /// when the print is meant to be. Returns what could not be judged.
     pub(crate) fn end(
         &self,
-        enclosed: Option<impl FnOnce() -> Enclosed>,
+        enclosed: Option<impl FnOnce(&[Family], f64) -> Enclosed>,
+        is_open: impl FnOnce() -> bool,
+        is_solid: bool,
+        findings: &mut Findings,
+    ) -> Option<&'static str> {
+        let mut own = Findings::default();
+        let note = self.compare(enclosed, is_solid, &mut own);
+        // Holes are looked for only where they would explain something: that takes time.
+        if own.is_empty() {
+            return note;
+        }
+        if is_open() {
+            return Some(
+                "volume: the model has holes that stay open, and what is laid is not what its \
+                 outlines seem to hold; nobody knows what it should be",
+            );
+        }
+        findings.append(own);
+        note
+    }
+
+    fn compare(
+        &self,
+        enclosed: Option<impl FnOnce(&[Family], f64) -> Enclosed>,
         is_solid: bool,
         findings: &mut Findings,
     ) -> Option<&'static str> {
@@ -189,7 +235,7 @@ impl Volume {
         } else {
             let note = "volume: layers are curved or lack ;Z: or ;HEIGHT:, only the whole print \
                         is compared";
-            (self.whole_mesh(&enclosed()), Some(note))
+            (self.whole_mesh(enclosed), Some(note))
         };
         whole(laid, &bill, is_solid, place, findings);
         note
@@ -211,11 +257,14 @@ impl Volume {
     }
 
     /// What the mesh holds, where sections do not count.
-    fn whole_mesh(&self, enclosed: &Enclosed) -> Bill {
+    fn whole_mesh(&self, enclosed: impl FnOnce(&[Family], f64) -> Enclosed) -> Bill {
         let height = self.layers.iter().filter_map(|layer| layer.height).fold(0.0, f64::max);
+        let enclosed = enclosed(&self.families, height);
         // An outline times the thickness of its layer is a piece of the surface.
         let edges = enclosed.surface * height * (1.0 - FRAC_PI_4) / 2.0;
-        Bill { section: enclosed.volume, border: enclosed.surface * self.border, edges }
+        // A layer that ends in a surface is laid whole or not at all.
+        let stairs = enclosed.along * height / 2.0;
+        Bill { section: enclosed.volume, border: enclosed.surface * self.border + stairs, edges }
     }
 }
 
@@ -226,6 +275,9 @@ pub(crate) struct Enclosed {
     pub(crate) volume: f64,
     /// Area of its surface, mm².
     pub(crate) surface: f64,
+    /// Area of what runs along the layers, mm². What leans against them counts by the share of it
+    /// that one layer meets.
+    pub(crate) along: f64,
 }
 
 /// What a layer, or a print, should hold.
@@ -330,8 +382,11 @@ mod tests {
             check.segment(&line);
         }
         let mut findings = Findings::default();
-        let enclosed = Enclosed { volume: 400.0, surface: 880.0 };
-        assert_eq!(check.end(Some(|| enclosed), is_solid, &mut findings), None);
+        let enclosed = Enclosed { volume: 400.0, surface: 880.0, along: 0.0 };
+        assert_eq!(
+            check.end(Some(|_: &[Family], _| enclosed), || false, is_solid, &mut findings),
+            None
+        );
         findings.kept().iter().map(|finding| finding.line).collect()
     }
 
@@ -379,12 +434,17 @@ mod tests {
         let mut check = Volume::new(2.0, 0.4);
         assert!(
             check
-                .end(None::<fn() -> Enclosed>, true, &mut findings)
+                .end(None::<fn(&[Family], f64) -> Enclosed>, || false, true, &mut findings)
                 .unwrap()
                 .contains("without a mesh")
         );
-        let small = Enclosed { volume: 1.0, surface: 6.0 };
-        assert!(check.end(Some(|| small), true, &mut findings).unwrap().contains("no layers"));
+        let small = Enclosed { volume: 1.0, surface: 6.0, along: 0.0 };
+        assert!(
+            check
+                .end(Some(|_: &[Family], _| small), || false, true, &mut findings)
+                .unwrap()
+                .contains("no layers")
+        );
         let mark = LayerMark {
             line: 4,
             index: 0,
@@ -398,12 +458,21 @@ mod tests {
         rising.filament = 200.0;
         check.segment(&rising);
         let block = block(10.0, 0.0, 1.0, 0.0);
-        let mesh = Enclosed { volume: section::volume(&block), surface: section::surface(&block) };
+        let mesh = Enclosed {
+            volume: section::volume(&block),
+            surface: section::surface(&block),
+            along: 0.0,
+        };
         assert_eq!(mesh.surface, 880.0);
-        assert!(check.end(Some(|| mesh), true, &mut findings).unwrap().contains("curved"));
+        assert!(
+            check
+                .end(Some(|_: &[Family], _| mesh), || false, true, &mut findings)
+                .unwrap()
+                .contains("curved")
+        );
         assert!(findings.checks().is_empty());
         check.segment(&rising);
-        check.end(Some(|| mesh), true, &mut findings);
+        check.end(Some(|_: &[Family], _| mesh), || false, true, &mut findings);
         assert_eq!(findings.checks(), [NAME]);
     }
 }
