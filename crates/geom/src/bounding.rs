@@ -70,10 +70,21 @@ impl Bounds {
 }
 
 /// A set of boxes that answers "which of you meet this one?".
+///
+/// Boxes that lie near each other share a leaf of the hierarchy, which would else be several times as
+/// large as the boxes themselves.
 pub struct BoxTree {
     boxes: Vec<Bounds>,
+    /// The numbers of the boxes, those of a leaf behind each other.
+    order: Vec<u32>,
     tree: Bvh,
 }
+
+/// Boxes that share a leaf.
+const BOXES_IN_LEAF: usize = 8;
+
+/// Bits of a place along each axis, as far as it decides on the order of boxes.
+const PLACE_BITS: u32 = 21;
 
 impl BoxTree {
     /// Builds the hierarchy over `boxes`; box `i` keeps the name `i`.
@@ -84,20 +95,32 @@ impl BoxTree {
     #[must_use]
     pub fn new(boxes: Vec<Bounds>) -> Self {
         assert!(u32::try_from(boxes.len()).is_ok(), "box indices are 32 bits wide");
-        let leaves: Vec<Aabb> = boxes.iter().map(|b| b.to_parry()).collect();
-        Self { boxes, tree: Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves) }
+        let order = along_curve(&boxes);
+        let around = |leaf: &[u32]| {
+            let mut all = Bounds::default();
+            for &i in leaf {
+                all.add(&boxes[i as usize].min);
+                all.add(&boxes[i as usize].max);
+            }
+            all.to_parry()
+        };
+        let leaves: Vec<Aabb> = order.chunks(BOXES_IN_LEAF).map(around).collect();
+        let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves);
+        Self { boxes, order, tree }
     }
 
     /// Returns the boxes that meet or touch `query`, ascending.
     #[must_use]
     pub fn meeting(&self, query: &Bounds) -> Vec<u32> {
         let query_box = query.to_parry();
-        let mut found: Vec<u32> = self
-            .tree
-            .intersect_aabb(&query_box)
-            // Inner nodes may be padded: the leaf decides.
-            .filter(|&i| meet(&self.boxes[i as usize], query))
-            .collect();
+        let leaf = |i: u32| {
+            let first = i as usize * BOXES_IN_LEAF;
+            &self.order[first..(first + BOXES_IN_LEAF).min(self.order.len())]
+        };
+        let leaves = self.tree.intersect_aabb(&query_box);
+        let near = leaves.flat_map(|i| leaf(i).iter().copied());
+        let mut found: Vec<u32> =
+            near.filter(|&i| meet(&self.boxes[i as usize], query)).collect();
         found.sort_unstable();
         found
     }
@@ -111,6 +134,31 @@ impl BoxTree {
         }
         pairs
     }
+}
+
+/// The numbers of boxes, ordered along a curve that stays near: G. M. Morton (1966), "A computer
+/// oriented geodetic data base and a new technique in file sequencing".
+fn along_curve(boxes: &[Bounds]) -> Vec<u32> {
+    let centres = || boxes.iter().map(|b| nalgebra::center(&b.min, &b.max));
+    let mut all = Bounds::default();
+    centres().for_each(|centre| all.add(&centre));
+    let cells = f64::from((1_u32 << PLACE_BITS) - 1);
+    let size = all.size().map(|side| if side > 0.0 { cells / side } else { 0.0 });
+    let place = |p: Point3<f64>| {
+        let [x, y, z] = [0, 1, 2].map(|k| spread(((p[k] - all.min[k]) * size[k]) as u64));
+        x | y << 1 | z << 2
+    };
+    let mut keys: Vec<(u64, u32)> = centres().map(place).zip(0..).collect();
+    keys.sort_unstable();
+    keys.into_iter().map(|(_, i)| i).collect()
+}
+
+/// Puts two zeros before each of the lowest [`PLACE_BITS`] bits.
+fn spread(bits: u64) -> u64 {
+    [(32, 0x001f_0000_0000_ffff), (16, 0x001f_0000_ff00_00ff), (8, 0x100f_00f0_0f00_f00f)]
+        .into_iter()
+        .chain([(4, 0x10c3_0c30_c30c_30c3), (2, 0x1249_2492_4924_9249)])
+        .fold(bits, |bits, (by, mask)| (bits | bits << by) & mask)
 }
 
 fn meet(a: &Bounds, b: &Bounds) -> bool {
@@ -146,6 +194,14 @@ mod tests {
         }
         assert!(!expected.is_empty());
         assert_eq!(BoxTree::new(boxes).meeting_pairs(), expected);
+    }
+
+    #[test]
+    fn places_are_spread_to_every_third_bit() {
+        for bit in 0..PLACE_BITS {
+            assert_eq!(spread(1 << bit), 1 << (3 * bit));
+        }
+        assert_eq!(spread((1 << PLACE_BITS) - 1), 0x1249_2492_4924_9249);
     }
 
     #[test]

@@ -233,17 +233,7 @@ impl Region {
     /// Returns whether the point (mm) lies inside; undecided exactly on a ring.
     #[must_use]
     pub fn contains(&self, p: &Point2<f64>) -> bool {
-        let mut inside = false;
-        for ring in self.rings() {
-            for (a, b) in ring_sides(ring) {
-                let (a, b) = (mm(a), mm(b));
-                if (a.y > p.y) != (b.y > p.y) {
-                    let x = a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
-                    inside ^= p.x < x;
-                }
-            }
-        }
-        inside
+        self.islands.iter().any(|island| is_inside(island, p))
     }
 
     /// Returns whether the whole segment from `a` to `b` (mm) lies inside.
@@ -378,6 +368,25 @@ fn segments_cross(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>, d: &Point2<
     let (c_side, d_side) = (side(a, b, c), side(a, b, d));
     let (a_side, b_side) = (side(c, d, a), side(c, d, b));
     c_side * d_side <= 0.0 && a_side * b_side <= 0.0 && (c_side != d_side || a_side != b_side)
+}
+
+/// Returns whether a point (mm) lies inside an island; undecided exactly on a ring.
+#[must_use]
+pub fn is_inside(island: &Island, p: &Point2<f64>) -> bool {
+    let mut inside = false;
+    for ring in island {
+        let Some(last) = ring.last() else { continue };
+        let mut a = mm(*last);
+        for b in ring {
+            let b = mm(*b);
+            if (a.y > p.y) != (b.y > p.y) {
+                let x = a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
+                inside ^= p.x < x;
+            }
+            a = b;
+        }
+    }
+    inside
 }
 
 #[cfg(test)]

@@ -14,19 +14,20 @@ use crate::grid::{GridPoint, steps};
 /// Marks the points of an open line that must stay so that none of the others lies farther than
 /// the limit from the line that is left; both ends are taken to stay.
 ///
-/// `distance_squared(a, b, p)` is the squared distance of point `p` from the segment `a`–`b`, all
+/// `segment(a, b)` returns what returns the squared distance of point `p` from the segment `a`–`b`, all
 /// three by index: the points may be of any kind, such as positions with a width.
-pub fn mark_kept(
+pub fn mark_kept<D: Fn(usize) -> f64>(
     first: usize,
     last: usize,
     limit_squared: f64,
-    distance_squared: impl Fn(usize, usize, usize) -> f64,
+    segment: impl Fn(usize, usize) -> D,
     keep: &mut [bool],
 ) {
     let mut stack = vec![(first, last)];
     while let Some((a, b)) = stack.pop() {
+        let distance_squared = segment(a, b);
         let farthest = (a + 1..b)
-            .map(|p| (distance_squared(a, b, p), p))
+            .map(|p| (distance_squared(p), p))
             // The first of equals, so that the choice does not depend on evaluation order.
             .reduce(|best, next| if next.0 > best.0 { next } else { best });
         if let Some((distance, p)) = farthest
@@ -57,8 +58,10 @@ pub fn simplify_ring(ring: &[GridPoint], tolerance: f64) -> Vec<GridPoint> {
         })
         .expect("more than three points");
     let limit = f64::from(steps(tolerance)).powi(2);
-    let distance = |a: usize, b: usize, p: usize| {
-        squared_distance(&float(points[a]), &float(points[b]), &float(points[p]))
+    let points_of = &points;
+    let distance = |a: usize, b: usize| {
+        let (a, b) = (float(points_of[a]), float(points_of[b]));
+        move |p: usize| squared_distance(&a, &b, &float(points_of[p]))
     };
     let mut keep = vec![false; points.len()];
     keep[0] = true;
@@ -78,7 +81,7 @@ pub fn simplify_line(points: &[Point2<f64>], tolerance: f64) -> Vec<Point2<f64>>
         return points.to_vec();
     }
     let distance =
-        |a: usize, b: usize, p: usize| squared_distance(&points[a], &points[b], &points[p]);
+        |a: usize, b: usize| move |p: usize| squared_distance(&points[a], &points[b], &points[p]);
     let mut keep = vec![false; points.len()];
     keep[0] = true;
     keep[points.len() - 1] = true;

@@ -208,15 +208,15 @@ impl<'a> Near<'a> {
         }
         let mut triangles = vec![Vec::new(); shells.len()];
         let mut all = Vec::new();
-        let mut boxes = Vec::new();
+        let box_of = |t: u32| Bounds::of(&solid.mesh().corners(t));
         for (t, &shell) in (0..).zip(solid.shell_of()) {
-            let bounds = Bounds::of(&solid.mesh().corners(t));
-            if !partners[shell as usize].is_empty() && meet(&bounds, &zones[shell as usize]) {
+            let has_partner = !partners[shell as usize].is_empty();
+            if has_partner && meet(&box_of(t), &zones[shell as usize]) {
                 triangles[shell as usize].push(t);
                 all.push(t);
-                boxes.push(bounds);
             }
         }
+        let boxes = all.iter().map(|t| box_of(*t)).collect();
         let least_wall = depth.max(WALL_SHARE * solid.mesh().bounds().diagonal());
         Self { solid, depth, least_wall, partners, triangles, all, tree: BoxTree::new(boxes) }
     }

@@ -23,7 +23,7 @@ use machine::height_map::HeightMap;
 use machine::kinematics::{Alignment, Branch, Unreachable};
 use machine::profile::{Axis, Printer};
 use machine::program::{BedTurn, Joints};
-use nalgebra::{Point2, Point3, Rotation2};
+use nalgebra::{Point2, Point3, UnitComplex};
 
 use crate::axis::{Piece, distance_to_axis, keep_clear, outside};
 use crate::route::{Kind, Stroke};
@@ -119,7 +119,7 @@ pub(crate) struct FlatLegs {
 pub struct Resampler {
     alignment: Alignment,
     /// From the slicer's frame to the part's.
-    azimuth: Rotation2<f64>,
+    azimuth: UnitComplex<f64>,
     params: ResampleParams,
     /// What nozzle and carriage keep from the axis, mm.
     clearance: f64,
@@ -132,7 +132,7 @@ pub struct Resampler {
     far_reach: f64,
     joints: Joints,
     /// How the rail then points over the bed.
-    facing: Rotation2<f64>,
+    facing: UnitComplex<f64>,
     branch: Branch,
     /// Where the nozzle stands over the bed; not always where the last stroke ended.
     over_bed: Point2<f64>,
@@ -161,7 +161,7 @@ impl Resampler {
         let reaches_far_side = params.dialect.reaches_far_side();
         Self {
             alignment: printer.alignment,
-            azimuth: Rotation2::new(params.azimuth),
+            azimuth: UnitComplex::new(params.azimuth),
             params,
             clearance: printer.axis_clearance
                 + if printer.head.is_some() { HEAD_ROUNDING_MM } else { 0.0 },
@@ -171,7 +171,7 @@ impl Resampler {
             most_turn: if reaches_far_side { printer.most_turn } else { f64::INFINITY },
             far_reach: if reaches_far_side { -printer.rail.min } else { f64::NEG_INFINITY },
             joints: printer.home,
-            facing: Rotation2::new(printer.alignment.bed.azimuth(printer.home.turn)),
+            facing: UnitComplex::new(printer.alignment.bed.azimuth(printer.home.turn)),
             branch: Branch::Near,
             over_bed: Point2::from(printer.alignment.over_bed(&at.xy())),
             meant: Point2::from(printer.alignment.over_bed(&at.xy())),
@@ -187,7 +187,7 @@ impl Resampler {
         let joints = printer.home;
         let at_part = self.alignment.part_from_joints(&joints);
         let over_bed = Point2::from(self.alignment.over_bed(&at_part.xy()));
-        let facing = Rotation2::new(self.alignment.bed.azimuth(joints.turn));
+        let facing = UnitComplex::new(self.alignment.bed.azimuth(joints.turn));
         let branch = Branch::Near;
         Self { joints, facing, branch, over_bed, meant: over_bed, at_part, ..self.clone() }
     }
@@ -565,7 +565,7 @@ impl Resampler {
             let over_bed = if k == pieces {
                 target.over_bed
             } else {
-                Point2::from(Rotation2::new(sweep * share) * start)
+                Point2::from(UnitComplex::new(sweep * share) * start)
             };
             let step = Target { over_bed, z: base + rise * share };
             let to = self.joints_at(&step)?;
@@ -595,7 +595,7 @@ impl Resampler {
         within(&self.rail, "carriage", to.s)?;
         within(&self.lift, "lift", to.z)?;
         let to = self.as_written(&to);
-        let facing = Rotation2::new(self.alignment.bed.azimuth(to.turn));
+        let facing = UnitComplex::new(self.alignment.bed.azimuth(to.turn));
         let part = self.alignment.part_from_bed(&(facing * self.alignment.nozzle(&to)));
         let at = Point3::new(part.x, part.y, to.z);
         let path = self.path_length(&to, at);
@@ -701,7 +701,7 @@ impl Resampler {
 }
 
 /// Turns a point about the z axis.
-fn turned(by: &Rotation2<f64>, p: &Point3<f64>) -> Point3<f64> {
+fn turned(by: &UnitComplex<f64>, p: &Point3<f64>) -> Point3<f64> {
     let xy = by * p.xy();
     Point3::new(xy.x, xy.y, p.z)
 }

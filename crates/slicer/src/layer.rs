@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use geom::grid::{GridPoint, mm};
-use geom::region::{Fill, Island, Region, Ring};
+use geom::region::{Fill, Island, Region, Ring, is_inside};
 use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
@@ -311,12 +311,18 @@ impl<'a> Ground<'a> {
         };
         let outline = Region::from_island(island.clone());
         self.0.iter().filter(|(around, _)| meets(around)).any(|(_, below)| {
-            let below = Region::from_island((*below).clone());
-            // Nearly always the first corner decides.
-            island.iter().flatten().any(|&p| below.contains(&mm(p)))
-                || !outline.intersection(&below).is_empty()
+            // Nearly always a corner of one lies in the other.
+            has_corner_in(island, below)
+                || has_corner_in(below, island)
+                || !outline.intersection(&Region::from_island((*below).clone())).is_empty()
         })
     }
+}
+
+/// Whether the first corner of an island lies in another.
+fn has_corner_in(island: &Island, other: &Island) -> bool {
+    let corner = island.first().and_then(|outer| outer.first());
+    corner.is_some_and(|corner| is_inside(other, &mm(*corner)))
 }
 
 /// The corners of the smallest box around an island.

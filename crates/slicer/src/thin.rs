@@ -292,7 +292,7 @@ fn simplified(line: &[AxisPoint], tolerance: f64) -> Vec<AxisPoint> {
     let mut keep = vec![false; line.len()];
     keep[0] = true;
     keep[line.len() - 1] = true;
-    let off = |a: usize, b: usize, p: usize| {
+    let off = |a: usize, b: usize| move |p: usize| {
         let (a, b, p) = (&line[a], &line[b], &line[p]);
         let share = share_nearest(&a.at, &b.at, &p.at);
         let at = a.at + (b.at - a.at) * share;

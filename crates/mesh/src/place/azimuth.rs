@@ -28,6 +28,7 @@ use crate::mesh::Mesh;
 use geom::circle::Circle;
 use nalgebra::{Complex, Point3};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 /// Harmonics below this are noise. Rounding to `f32` leaves 1e-7, text with three decimals 1e-5
@@ -60,8 +61,11 @@ pub fn reference_azimuth(mesh: &Mesh) -> f64 {
     };
     let by_area = low(Weight::Area);
     let found = lowest(&by_area).or_else(|| lowest(&low(Weight::Height))).or_else(|| {
-        // A round part of millions of facets is known to be one in less time than this would take.
-        let round = cells.as_ref().is_some_and(cells::Cells::are_surely_round);
+        // A round part of many facets is known to be one in less time than this would take.
+        let many = mesh.triangles.len() >= cells::TELL_ROUND;
+        let cells = cells.as_ref().map(Cow::Borrowed);
+        let cells = cells.or_else(|| many.then(|| Cow::Owned(cells::Cells::of(&surface))));
+        let round = cells.is_some_and(|cells| cells.are_surely_round());
         if round { None } else { lowest(&surface.harmonics(HIGH, Weight::Area)) }
     });
     let Some((k, harmonic)) = found else { return 0.0 };

@@ -2,12 +2,12 @@
 
 use machine::kinematics::Alignment;
 use machine::program::Joints;
-use nalgebra::{Point2, Rotation2, Vector2};
+use nalgebra::{Point2, UnitComplex, Vector2};
 
 /// A move from where the joints stand, seen from the rail as it then points over the bed.
 pub(super) struct Sweep {
     /// From the rail's frame at the begin to the bed's.
-    facing: Rotation2<f64>,
+    facing: UnitComplex<f64>,
     /// The nozzle in the frame of the rail at the begin, and how far it runs in it.
     nozzle: Vector2<f64>,
     run: Vector2<f64>,
@@ -19,7 +19,7 @@ impl Sweep {
     /// The move to `to` from `from`, where the rail points over the bed as `facing` says.
     pub(super) fn new(
         alignment: &Alignment,
-        facing: Rotation2<f64>,
+        facing: UnitComplex<f64>,
         from: &Joints,
         to: &Joints,
     ) -> Self {
@@ -35,7 +35,7 @@ impl Sweep {
     /// Where the nozzle is over the bed when a share of the move is done, and which way it goes there:
     /// the derivative by the share.
     pub(super) fn at(&self, share: f64) -> (Point2<f64>, Vector2<f64>) {
-        let by = self.facing * Rotation2::new(self.turn * share);
+        let by = self.facing * UnitComplex::new(self.turn * share);
         let nozzle = self.nozzle + self.run * share;
         let heading = self.run + Vector2::new(-nozzle.y, nozzle.x) * self.turn;
         (Point2::from(by * nozzle), by * heading)
@@ -45,11 +45,11 @@ impl Sweep {
     /// `unit`. The middle is mostly the farthest.
     pub(super) fn is_near(&self, point: &Point2<f64>, unit: &Vector2<f64>, tolerance: f64) -> bool {
         let (point, unit) = (self.facing.inverse() * point, self.facing.inverse() * unit);
-        let is_near = |by: &Rotation2<f64>, share: f64| {
+        let is_near = |by: &UnitComplex<f64>, share: f64| {
             let nozzle = by * (self.nozzle + self.run * share);
             unit.perp(&(nozzle - point.coords)).abs() <= tolerance
         };
-        let quarter = Rotation2::new(self.turn / 4.0);
+        let quarter = UnitComplex::new(self.turn / 4.0);
         let half = quarter * quarter;
         is_near(&half, 0.5) && is_near(&quarter, 0.25) && is_near(&(half * quarter), 0.75)
     }
@@ -76,7 +76,7 @@ mod tests {
     fn places_are_those_of_the_joints_between_and_headings_their_derivative() {
         let from = Joints { s: 31.0, turn: BedTurn::accumulated(40.3), z: 2.0 };
         let to = Joints { s: 27.5, turn: BedTurn::accumulated(40.9), z: 2.4 };
-        let facing = Rotation2::new(LEANING.bed.azimuth(from.turn));
+        let facing = UnitComplex::new(LEANING.bed.azimuth(from.turn));
         let sweep = Sweep::new(&LEANING, facing, &from, &to);
         let place = |share: f64| LEANING.over_bed_from_joints(&POLAR.between(&from, &to, share));
         for share in [0.0, 0.25, 0.4, 0.75, 1.0] {
@@ -92,7 +92,7 @@ mod tests {
     fn a_move_is_near_its_own_line_up_to_its_sagitta() {
         let from = Joints { s: 40.0, turn: BedTurn::accumulated(0.0), z: 0.0 };
         let to = Joints { turn: BedTurn::accumulated(0.2), ..from };
-        let sweep = Sweep::new(&Alignment::IDEAL, Rotation2::identity(), &from, &to);
+        let sweep = Sweep::new(&Alignment::IDEAL, UnitComplex::identity(), &from, &to);
         let ends = [sweep.at(0.0).0, sweep.at(1.0).0];
         let unit = (ends[1] - ends[0]).normalize();
         let sagitta = 40.0 * (1.0 - 0.1_f64.cos());

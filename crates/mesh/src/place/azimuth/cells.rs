@@ -23,6 +23,9 @@ use rayon::prelude::*;
 /// From this number of triangles on, most of them are smaller than a cell.
 pub(super) const WORTH_IT: usize = 1 << 17;
 
+/// From this number of triangles on, the harmonics of a round part take longer than its cells.
+pub(super) const TELL_ROUND: usize = 1 << 14;
+
 /// Cells along a side of the grid.
 const SIDE: usize = 256;
 
@@ -133,6 +136,7 @@ impl Cell {
 }
 
 /// What is known of a surface.
+#[derive(Clone)]
 pub(super) struct Cells {
     cells: Vec<Cell>,
     area: f64,
