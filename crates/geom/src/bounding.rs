@@ -119,8 +119,7 @@ impl BoxTree {
         };
         let leaves = self.tree.intersect_aabb(&query_box);
         let near = leaves.flat_map(|i| leaf(i).iter().copied());
-        let mut found: Vec<u32> =
-            near.filter(|&i| meet(&self.boxes[i as usize], query)).collect();
+        let mut found: Vec<u32> = near.filter(|&i| meet(&self.boxes[i as usize], query)).collect();
         found.sort_unstable();
         found
     }

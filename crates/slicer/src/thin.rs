@@ -292,12 +292,14 @@ fn simplified(line: &[AxisPoint], tolerance: f64) -> Vec<AxisPoint> {
     let mut keep = vec![false; line.len()];
     keep[0] = true;
     keep[line.len() - 1] = true;
-    let off = |a: usize, b: usize| move |p: usize| {
-        let (a, b, p) = (&line[a], &line[b], &line[p]);
-        let share = share_nearest(&a.at, &b.at, &p.at);
-        let at = a.at + (b.at - a.at) * share;
-        let half_width = (a.width + (b.width - a.width) * share - p.width) / 2.0;
-        (p.at - at).norm_squared() + half_width * half_width
+    let off = |a: usize, b: usize| {
+        move |p: usize| {
+            let (a, b, p) = (&line[a], &line[b], &line[p]);
+            let share = share_nearest(&a.at, &b.at, &p.at);
+            let at = a.at + (b.at - a.at) * share;
+            let half_width = (a.width + (b.width - a.width) * share - p.width) / 2.0;
+            (p.at - at).norm_squared() + half_width * half_width
+        }
     };
     mark_kept(0, line.len() - 1, tolerance * tolerance, off, &mut keep);
     line.iter().zip(keep).filter(|(_, keep)| *keep).map(|(p, _)| *p).collect()
