@@ -348,9 +348,9 @@ fn planar_tops(text: &str, least: f64) -> Vec<f64> {
 fn every_flat_top_is_finished_by_planar_layers() {
     for layers in [
         ["--layers=conical", "--cone-angle=30"],
-        ["--layers=conical", "--cone-angle=-45"],
-        ["--layers=spherical", "--sphere-centre=-60"],
-        ["--layers=caps", "--cap-radius=90"],
+        ["--layers=conical", "--cone-angle=-30"],
+        ["--layers=spherical", "--sphere-centre=-40"],
+        ["--layers=caps", "--cap-radius=50"],
     ] {
         let mut arguments = vec!["--set", "top=planar", "--set", "fill_density=100%"];
         arguments.extend(["--set", "skirts=0"]);

@@ -88,7 +88,7 @@ pub(super) const KEYS: &[Key] = &[
         Print,
         "top",
         &["curved", "planar"],
-        "whether the flat face on top of a part in curved layers is left to them, which shows as \
+        "whether flat faces on top of a part in curved layers are left to them, which shows as \
          steps, or finished by planar layers",
     ),
     number(Print, "layer_height_mm", "layer_height", (0.2, 0.01, 2.0), "thickness of a layer"),
