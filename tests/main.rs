@@ -52,6 +52,7 @@ mod threads;
 mod thumbnail;
 mod tilt;
 mod time;
+mod twins;
 mod verify;
 mod volume;
 mod walls;

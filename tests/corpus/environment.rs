@@ -67,7 +67,7 @@ const HELD_BY: [(&str, &str); 53] = [
         "fd_limit",
         "tests/outputs.rs::few_file_handles_no_environment_and_a_folder_that_is_gone_are_enough",
     ),
-    ("mem_limit", "tests/budgets.rs::work_for_hours_is_refused_before_it_begins"),
+    ("mem_limit", "tests/budgets.rs::few_addresses_are_enough"),
     ("thread_limit", "tests/environment.rs::one_thread_is_enough"),
     ("clock_1970", "tests/environment.rs::place_time_and_language_change_no_byte"),
     ("net_refused", "tests/send.rs::nobody_there_and_no_print_server_there"),

@@ -152,7 +152,10 @@ impl<W: Write> Emitter<W> {
     /// What the writer reports.
     pub fn text(&mut self, line: &str) -> io::Result<()> {
         let line = printable(line);
-        self.line.extend(line.trim_end().bytes().take(MOST_COLUMNS));
+        self.line.extend(line.bytes().take(MOST_COLUMNS));
+        // Where it is cut there may be a blank.
+        let length = self.line.trim_ascii_end().len();
+        self.line.truncate(length);
         self.end_line()
     }
 
@@ -564,6 +567,8 @@ mod tests {
         assert_eq!(out, "; cube?M104 S999??M105 ?\nM104 S200?M1\n");
         let long = text(POLAR, &[Step::Remark("x".repeat(500))]);
         assert_eq!(long.trim_end().len(), MOST_COLUMNS);
+        let blank = text(POLAR, &[Step::Remark(format!("{} {}", "x".repeat(87), "x".repeat(20)))]);
+        assert!(blank.ends_with("x\n"), "no blank at the end of a line that is cut: {blank:?}");
     }
 
     #[test]
