@@ -1,5 +1,7 @@
 //! What people look at in a print: bridges, overhangs, tops, infill.
 
+use std::collections::BTreeMap;
+
 use mesh::mesh::Mesh;
 use mesh::shapes::extruded;
 use nalgebra::{Isometry3, Vector3};
@@ -379,4 +381,89 @@ fn a_bead_thinner_than_announced_is_found() {
     scratch.file("x.gcode", text.replace(";HEIGHT:0.4", ";HEIGHT:0.3"));
     let ran = scratch.run(&["verify", "x.gcode"]).expect(1);
     assert!(ran.out.contains("flow"), "{}", ran.out);
+}
+
+/// Places on the beads of a program by layer and square cell, to find what is near.
+struct Near(BTreeMap<(usize, i64, i64), Vec<[f64; 3]>>);
+
+const CELL_MM: f64 = 3.0;
+
+impl Near {
+    fn new<'a>(all: impl Iterator<Item = &'a Motion<'a>>) -> Self {
+        let mut cells: BTreeMap<_, Vec<_>> = BTreeMap::new();
+        for motion in all {
+            for at in places(motion) {
+                let [x, y] = [0, 1].map(|k| (at[k] / CELL_MM).floor() as i64);
+                cells.entry((motion.layer.unwrap(), x, y)).or_default().push(at);
+            }
+        }
+        Self(cells)
+    }
+
+    /// How far the nearest place of a layer is, if it is nearer than a cell.
+    fn distance(&self, layer: usize, at: &[f64; 3]) -> f64 {
+        let [x, y] = [0, 1].map(|k| (at[k] / CELL_MM).floor() as i64);
+        let mut least = f64::INFINITY;
+        for cell in (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| (layer, x, y))) {
+            for p in self.0.get(&cell).into_iter().flatten() {
+                least = (0..3).map(|k| (p[k] - at[k]).powi(2)).sum::<f64>().sqrt().min(least);
+            }
+        }
+        least
+    }
+}
+
+/// Places along a motion, 0.2 mm apart.
+fn places<'a>(motion: &'a Motion<'a>) -> impl Iterator<Item = [f64; 3]> + 'a {
+    let steps = (motion.path() / 0.2).ceil().max(1.0);
+    (0..=steps as u32).map(move |k| motion.at(f64::from(k) / steps))
+}
+
+#[test]
+fn lightning_carries_tops_from_the_walls() {
+    let block = mesh::shapes::cube(20.0);
+    for layers in ["planar", "conical", "spherical"] {
+        let common = ["--layers", layers, "--cone-angle", "25", "--verify", "full"];
+        let of = |pattern| sliced(&block, &[&common[..], &["--set", pattern]].concat());
+        let text = of("fill_pattern=lightning");
+        let share = sparse(&text).1[1] / sparse(&of("fill_pattern=rectilinear")).1[1];
+        assert!((0.02..0.5).contains(&share), "{layers}: {share} of the material of lines");
+        let all = motions(&text);
+        let laid = || all.iter().filter(|m| m.lays() && m.layer.is_some());
+        let every = Near::new(laid());
+        let walls = Near::new(laid().filter(|m| m.role != "Internal infill"));
+        // A third of its width carries every branch, as it does an overhang of 56°: its middle lies within
+        // 0.75 mm of that of a wall below.
+        let mut tips = 0;
+        for motion in laid().filter(|m| m.role == "Internal infill") {
+            for at in places(motion) {
+                let off = every.distance(motion.layer.unwrap() - 1, &at);
+                assert!(off < 0.78, "{layers}: {at:?} hangs {off} mm from anything");
+            }
+            tips += 1;
+        }
+        assert!(tips > 100, "{layers}: {tips}");
+        // All that closes the part has a wall or a branch near.
+        let solid = laid().filter(|m| m.role == "Solid infill" && m.layer > Some(3));
+        let mut judged = 0;
+        for at in solid.flat_map(|m| places(m).map(|at| (m.layer.unwrap(), at))) {
+            let off = every.distance(at.0 - 1, &at.1);
+            assert!(off < 2.9, "{layers}: layer {} at {:?}: {off}", at.0, at.1);
+            judged += 1;
+        }
+        assert!(judged > 1000, "{layers}: {judged}");
+        // Every line has an end at a wall, at what is solid in its layer, or at another branch.
+        for line in beads(&all, "Internal infill") {
+            let layer = line[0].layer.unwrap();
+            let ends = [line[0].at(0.0), line[line.len() - 1].at(1.0)];
+            if ends.iter().any(|at| walls.distance(layer, at) < 1.0) {
+                continue;
+            }
+            let first = line[0].line..=line[line.len() - 1].line;
+            let others = laid().filter(|m| m.layer == Some(layer) && m.role == "Internal infill");
+            let others = Near::new(others.filter(|m| !first.contains(&m.line)));
+            let at_branch = ends.iter().any(|at| others.distance(layer, at) < 0.5);
+            assert!(at_branch, "{layers}: layer {layer}, {ends:?}");
+        }
+    }
 }

@@ -6,22 +6,17 @@ use slicer::layer::Filled;
 use slicer::section::Tears;
 use slicer::support::Column;
 
+use crate::failure::Failure;
 use crate::groups::{stacks, surround, together};
+use crate::interrupt::Interrupt;
 use crate::pipeline::Parts;
 use crate::settings::Job;
 use crate::stack::Stack;
 use crate::stages::Stage;
 
-/// Layers that each thread has to work at in a window: enough to even out what they take.
-const LAYERS_PER_THREAD: usize = 8;
-
-/// Fewest and most layers that are worked at once. A window of a fine model is a few megabytes.
-const WINDOWS: [usize; 2] = [16, 64];
-
-/// Returns how many layers are worked at once. What comes of them does not depend on it.
-pub(crate) fn window_size() -> usize {
-    (LAYERS_PER_THREAD * rayon::current_num_threads()).clamp(WINDOWS[0], WINDOWS[1])
-}
+/// Layers that are worked at once: enough to keep all threads busy, and as many as most numbers of layers
+/// whose sparse infill is laid at once divide. A window of a fine model is a few megabytes.
+pub(crate) const WINDOW: usize = 48;
 
 /// The layers of a window with their lines.
 pub(crate) struct Batch {
@@ -46,6 +41,7 @@ pub(crate) struct Filling<'a> {
     next: Option<usize>,
     stacks: Vec<Stack<'a>>,
     is_first: bool,
+    interrupt: &'a Interrupt,
 }
 
 impl<'a> Filling<'a> {
@@ -55,21 +51,25 @@ impl<'a> Filling<'a> {
         stages: &'a [Stage],
         columns: &'a [Vec<Column>],
         job: &'a Job,
+        interrupt: &'a Interrupt,
     ) -> Self {
-        let stacks = Vec::new();
-        Self { parts, stages, columns, job, stage: 0, next: None, stacks, is_first: true }
+        let (next, stacks, is_first) = (None, Vec::new(), true);
+        Self { parts, stages, columns, job, stage: 0, next, stacks, is_first, interrupt }
     }
 
     fn below(&self) -> Option<&'a Stage> {
         self.stage.checked_sub(1).map(|below| &self.stages[below])
     }
 
-    fn begin(&mut self, stage: &'a Stage) -> usize {
+    fn begin(&mut self, stage: &'a Stage) -> Result<usize, Failure> {
         self.stacks = stacks(self.parts.groups, self.parts.all, stage, self.below(), self.job);
         if let Some(first) = self.stacks.first_mut() {
             first.stand_on(&self.columns[self.stage]);
         }
-        stage.printed.start
+        for stack in &mut self.stacks {
+            stack.grow(self.interrupt)?;
+        }
+        Ok(stage.printed.start)
     }
 
     /// Skirt and brim, which go round all.
@@ -81,18 +81,13 @@ impl<'a> Filling<'a> {
             surround(layer, all);
         }
     }
-}
 
-impl Iterator for Filling<'_> {
-    type Item = Batch;
-
-    fn next(&mut self) -> Option<Batch> {
-        let stage = self.stages.get(self.stage)?;
+    fn window(&mut self, stage: &'a Stage) -> Result<Batch, Failure> {
         let start = match self.next {
             Some(start) => start,
-            None => self.begin(stage),
+            None => self.begin(stage)?,
         };
-        let window = start..(start + window_size()).min(stage.printed.end);
+        let window = start..(start + WINDOW).min(stage.printed.end);
         let mut tears = Vec::new();
         for stack in &mut self.stacks {
             stack.reach(&window, |torn| tears.push(*torn));
@@ -109,6 +104,15 @@ impl Iterator for Filling<'_> {
             (self.stage, self.next) = (self.stage + 1, None);
             self.stacks.clear();
         }
-        Some(batch)
+        Ok(batch)
+    }
+}
+
+impl Iterator for Filling<'_> {
+    type Item = Result<Batch, Failure>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let stage = self.stages.get(self.stage)?;
+        Some(self.window(stage))
     }
 }

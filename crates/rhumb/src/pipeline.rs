@@ -347,13 +347,13 @@ fn layers(
     let count: usize = stages.iter().map(|stage| stage.printed.len()).sum();
     watch.progress.stage("slice", count as u64);
     let mut printing = Printing { stages, job, planner, text, progress: watch.progress, printed };
-    let mut filling = Filling::new(parts, stages, &columns, job);
-    let mut filled = filling.next();
+    let mut filling = Filling::new(parts, stages, &columns, job, watch.interrupt);
+    let mut filled = filling.next().transpose()?;
     while let Some(batch) = filled {
         watch.interrupt.check()?;
         let (planned, next) = rayon::join(|| printing.print(batch), || filling.next());
         planned?;
-        filled = next;
+        filled = next.transpose()?;
     }
     let Printing { planner, mut printed, .. } = printing;
     let (steps, totals) =

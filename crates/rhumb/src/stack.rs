@@ -7,10 +7,12 @@ use std::ops::Range;
 
 use geom::region::Region;
 use mesh::topology::Solid;
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
-use slicer::chart::{carried, carried_to_cone};
+use slicer::chart::{Chart, carried, carried_point, carried_to_cone};
 use slicer::compensation::{CompensationParams, compensated};
+use slicer::infill::Pattern;
+use slicer::infill::lightning::{Branches, Stratum, grow};
 use slicer::layer::{Filled, Parted};
 use slicer::level::Level;
 use slicer::lift::Lift;
@@ -20,6 +22,9 @@ use slicer::stacking::{Side, Stair};
 use slicer::support::{Column, Shade, SupportParams, hanging};
 use slicer::surface::LayerSurface;
 
+use crate::failure::Failure;
+use crate::filling::WINDOW;
+use crate::interrupt::Interrupt;
 use crate::settings::Job;
 use crate::stages::Stage;
 
@@ -38,6 +43,8 @@ pub(crate) struct Stack<'a> {
     job: &'a Job,
     /// The supports of the layers printed, if there are any.
     columns: &'a [Column],
+    /// The lines of sparse infill of the layers printed, where they are found for all together.
+    branches: Vec<Branches>,
     /// Sections from `first` on, each with a thinned-out copy for comparing layers.
     sections: VecDeque<(Section, Region)>,
     first: usize,
@@ -56,12 +63,75 @@ impl<'a> Stack<'a> {
         let first = stage.printed.start.saturating_sub(skins.bottom_layers.max(1));
         let stair = below.and_then(|below| below.stair(&stage.levels[stage.printed.start]));
         let sections = VecDeque::new();
-        Self { solid, cutter, stage, stair, job, columns: &[], sections, first }
+        let branches = Vec::new();
+        Self { solid, cutter, stage, stair, job, columns: &[], branches, sections, first }
     }
 
     /// Stands on these supports, of which there is one for every layer printed.
     pub(crate) fn stand_on(&mut self, columns: &'a [Column]) {
         self.columns = columns;
+    }
+
+    /// Finds the sparse infill that depends on all layers above.
+    ///
+    /// # Errors
+    ///
+    /// When the user interrupts.
+    pub(crate) fn grow(&mut self, interrupt: &Interrupt) -> Result<(), Failure> {
+        let params = &self.job.paths;
+        let how = &params.infill;
+        if how.pattern != Pattern::Lightning || how.density <= 0.0 || params.skins.all_solid {
+            return Ok(());
+        }
+        let Self { solid, stage, stair, job, first, .. } = *self;
+        let Range { start, end } = stage.printed;
+        let mut ahead = Self { stair, first, ..Self::new(solid, stage, None, job) };
+        let mut cores: Vec<(Region, f64)> = Vec::with_capacity(end - start);
+        for from in stage.printed.clone().step_by(WINDOW) {
+            interrupt.check()?;
+            let window = from..(from + WINDOW).min(end);
+            ahead.reach(&window, |_| {});
+            let core = |k| ahead.part(k).map(|layer| layer.core(params)).unwrap_or_default();
+            cores.par_extend(window.into_par_iter().map(core));
+        }
+        let strata = (0..cores.len()).into_par_iter().map(|i| {
+            let (core, above) = (&cores[i].0, cores.get(i + 1));
+            let above = above.map(|(above, _)| self.region_below(above, start + i));
+            let closed = above.map_or_else(|| core.clone(), |above| core.difference(&above));
+            let level = &stage.levels[start + i];
+            let reach = level.thickness() / stage.surface.level_step(1.0);
+            Stratum { core: core.clone(), closed, reach }
+        });
+        let strata: Vec<Stratum> = strata.collect();
+        // Layers of other thicknesses have lines that are a little nearer or farther.
+        let spacing = cores.iter().map(|(_, spacing)| *spacing).fold(0.0, f64::max);
+        self.branches = grow(&strata, |i, p| self.point_below(p, start + i - 1), spacing);
+        Ok(())
+    }
+
+    /// A place of layer `k + 1` on layer `k`.
+    fn point_below(&self, p: &Point2<f64>, k: usize) -> Point2<f64> {
+        if self.stage.morph.is_some() {
+            let charts = [k, k + 1].map(|i| self.chart(i));
+            return charts[0].under(&charts[1].seen_from_above(p));
+        }
+        let [to, from] = [k, k + 1].map(|i| self.stage.levels[i].upper);
+        carried_point(&*self.stage.surface, p, from, to)
+    }
+
+    /// A region of layer `k + 1` on layer `k`.
+    fn region_below(&self, region: &Region, k: usize) -> Region {
+        if self.stage.morph.is_some() {
+            let charts = [k, k + 1].map(|i| self.chart(i));
+            return charts[0].region_under(&charts[1].region_from_above(region));
+        }
+        let [to, from] = [k, k + 1].map(|i| self.stage.levels[i].upper);
+        carried(&*self.stage.surface, region, from, to)
+    }
+
+    fn chart(&self, k: usize) -> Chart {
+        let lift = self.lift(k);
+        lift.surface.chart(lift.level.upper)
     }
 
     /// Cuts what is missing for a window and drops what no later window needs; `torn` sees every
@@ -119,7 +189,7 @@ impl<'a> Stack<'a> {
         }
         let parted = window.clone().into_par_iter().map(|k| self.part(k));
         let mut parted: Vec<Option<Parted<'_>>> = parted.collect();
-        for (index, group) in self.combined(&window).into_iter().enumerate() {
+        for (index, group) in self.combined(&window) {
             let layers = &mut parted[group.start - window.start..group.end - window.start];
             self.combine(layers, group, index);
         }
@@ -129,7 +199,8 @@ impl<'a> Stack<'a> {
 
     /// The groups of layers of a window whose sparse infill is laid at once: as many as are wanted, or as
     /// many as are not too thick together.
-    fn combined(&self, window: &Range<usize>) -> Vec<Range<usize>> {
+    /// With each comes how many there are below it.
+    fn combined(&self, window: &Range<usize>) -> Vec<(usize, Range<usize>)> {
         /// Rounding of a sum of heights, mm.
         const SLACK_MM: f64 = 1e-6;
         if self.stage.morph.is_some() {
@@ -140,11 +211,12 @@ impl<'a> Stack<'a> {
         let most = how.thickest * self.stage.surface.level_step(1.0) + SLACK_MM;
         let mut groups: Vec<Range<usize>> = Vec::new();
         // What lies on a stair has a lower side of its own.
-        let stair = usize::from(self.stair.is_some() && window.start == self.stage.printed.start);
-        for k in window.start + stair..window.end {
+        let stair = usize::from(self.stair.is_some());
+        for k in self.stage.printed.start + stair..window.end {
             match groups.last_mut() {
                 Some(group)
-                    if group.len() < how.every
+                    if k != window.start
+                        && group.len() < how.every
                         && levels[k].upper - levels[group.start].lower <= most =>
                 {
                     group.end = k + 1;
@@ -152,8 +224,8 @@ impl<'a> Stack<'a> {
                 _ => groups.push(k..k + 1),
             }
         }
-        groups.retain(|group| group.len() > 1);
-        groups
+        let groups = groups.into_iter().enumerate();
+        groups.filter(|(_, group)| group.start >= window.start && group.len() > 1).collect()
     }
 
     /// Has the sparse infill that all layers of a group have laid by the last of them.
@@ -216,7 +288,9 @@ impl<'a> Stack<'a> {
             below: below.iter().map(AsRef::as_ref).collect(),
             support,
         };
-        Some(Parted::new(&lift, &material, &neighbours, &self.job.paths).on(support))
+        let parted = Parted::new(&lift, &material, &neighbours, &self.job.paths).on(support);
+        let branches = self.branches.get(k.wrapping_sub(self.stage.printed.start));
+        Some(parted.with_branches(branches.map_or(&[], Vec::as_slice)))
     }
 
     /// Layers of a window as they are seen along the axis, for what supports them.

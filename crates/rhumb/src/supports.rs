@@ -5,7 +5,7 @@ use mesh::topology::Solid;
 use slicer::support::{Column, Shade, columns};
 
 use crate::failure::Failure;
-use crate::filling::window_size;
+use crate::filling::WINDOW;
 use crate::pipeline::Watch;
 use crate::settings::Job;
 use crate::stack::Stack;
@@ -31,9 +31,9 @@ pub(crate) fn supports(
     for (index, stage) in stages.iter().enumerate() {
         let below = index.checked_sub(1).map(|below| &stages[below]);
         let mut stack = Stack::new(solid, stage, below, job);
-        for start in stage.printed.clone().step_by(window_size()) {
+        for start in stage.printed.clone().step_by(WINDOW) {
             watch.interrupt.check()?;
-            let window = start..(start + window_size()).min(stage.printed.end);
+            let window = start..(start + WINDOW).min(stage.printed.end);
             stack.reach(&window, |_| {});
             watch.progress.advance(window.len() as u64);
             shades.extend(stack.shades(window, params));

@@ -93,6 +93,8 @@ pub struct Parted<'a> {
     floating: Vec<Floating>,
     /// Sparse infill as thick as several layers, and the family that it is part of.
     thick: Option<Thick<'a>>,
+    /// The lines of sparse infill that are known beforehand, in the chart.
+    branches: &'a [Vec<Point2<f64>>],
     is_vase: bool,
 }
 
@@ -139,6 +141,7 @@ impl<'a> Parted<'a> {
             hanging,
             support: None,
             thick: None,
+            branches: &[],
             is_vase,
         }
     }
@@ -147,6 +150,23 @@ impl<'a> Parted<'a> {
     #[must_use]
     pub fn on(self, support: Option<&'a Column>) -> Self {
         Self { support, ..self }
+    }
+
+    /// Adds the lines of sparse infill that were found for all layers together, in the chart.
+    #[must_use]
+    pub fn with_branches(self, branches: &'a [Vec<Point2<f64>>]) -> Self {
+        Self { branches, ..self }
+    }
+
+    /// Returns where the middles of sparse lines may lie, and how far such lines of the wanted density
+    /// are apart, mm.
+    #[must_use]
+    pub fn core(&self, params: &PathParams) -> (Region, f64) {
+        let Frame { chart, thickness, .. } = Frame::of(&self.lift);
+        let bead = infill::sparse::bead(thickness, &params.infill);
+        let from_edge = infill::sparse::from_edge(&bead, &params.infill);
+        let core = chart.inset(&self.sparse(), from_edge);
+        (core, bead.spacing() / params.infill.density)
     }
 
     /// Returns what sparse infill takes.
@@ -202,6 +222,17 @@ impl<'a> Parted<'a> {
         for (paths, lost) in islands {
             filled.paths.lost.merge(&lost);
             filled.paths.islands.push(paths);
+        }
+        let bead = infill::sparse::bead(frame.thickness, &params.infill);
+        let least = infill::lightning::STUB_IN_WIDTHS * bead.width;
+        let long = |line: &&Vec<_>| geom::polyline::length(line) >= least;
+        for line in self.branches.iter().filter(long) {
+            // A branch lies within one island.
+            let Some(first) = line.first() else { continue };
+            let home = self.islands.iter().position(|island| island.outline.contains(first));
+            if let Some(paths) = home.and_then(|home| filled.paths.islands.get_mut(home)) {
+                paths.fills.push(frame.line(line, bead, Role::InternalInfill, false));
+            }
         }
         filled.paths.supports = supports(self.support, &frame, params);
         if level.index == 0 && frame.chart.is_flat() {

@@ -487,7 +487,11 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
             longest_join: get.number("infill_anchor_max_mm"),
             bridge_flow: get.number("bridge_flow_ratio"),
             overlap: get.number("infill_overlap"),
-            every: get.count("infill_every_layers"),
+            // Branches lie over each other in every layer.
+            every: match get.text("fill_pattern") {
+                "lightning" => 1,
+                _ => get.count("infill_every_layers"),
+            },
             thickest: get.number("nozzle_diameter_mm").min(get.number("infill_extrusion_width_mm")),
             ironing: get.switch("ironing").then(|| IroningParams {
                 spacing: get.number("ironing_spacing_mm"),
@@ -560,6 +564,7 @@ fn pattern(word: &str) -> Pattern {
         "triangles" => Pattern::Triangles,
         "stars" => Pattern::Stars,
         "cubic" => Pattern::Cubic,
+        "lightning" => Pattern::Lightning,
         "gyroid" => Pattern::Gyroid,
         "honeycomb" => Pattern::Honeycomb,
         "concentric" => Pattern::Concentric,

@@ -36,11 +36,21 @@ const GREATEST_STEP_MM: f64 = 1.0;
 /// Squares along an axis of the grid, at most.
 const MOST_STEPS: f64 = 2048.0;
 
-/// Fills a sparse area.
+/// The bead of sparse lines.
+pub(crate) fn bead(thickness: f64, params: &InfillParams) -> Bead {
+    Bead { width: params.width, thickness }
+}
+
+/// How far the middles of sparse lines end from the edge of their area, mm.
+pub(crate) fn from_edge(bead: &Bead, params: &InfillParams) -> f64 {
+    (bead.spacing() / 2.0 - params.overlap * bead.width).max(0.0)
+}
+
+/// Fills a sparse area; but for `lightning`, whose lines are known when all layers are.
 pub(crate) fn fill(area: &Region, layer: &FillLayer<'_>, params: &InfillParams) -> Vec<FillLine> {
-    let bead = Bead { width: params.width, thickness: layer.thickness };
+    let bead = bead(layer.thickness, params);
     let spacing = bead.spacing() / params.density;
-    let from_edge = (bead.spacing() / 2.0 - params.overlap * bead.width).max(0.0);
+    let from_edge = from_edge(&bead, params);
     match params.pattern {
         Pattern::Concentric => {
             let loops = concentric::sparse(area, &layer.chart, bead.spacing() / 2.0, spacing);
@@ -54,6 +64,7 @@ pub(crate) fn fill(area: &Region, layer: &FillLayer<'_>, params: &InfillParams) 
             let joins = joins(params);
             return open_lines(&core, &chords, &joins, Role::InternalInfill, bead, layer);
         }
+        Pattern::Lightning => return Vec::new(),
         _ => {}
     }
     let core = layer.chart.inset(area, from_edge);
@@ -98,7 +109,10 @@ impl Sparse<'_> {
             Pattern::Cubic => self.cubic(),
             Pattern::Gyroid => self.gyroid(),
             Pattern::Honeycomb => self.honeycomb(),
-            Pattern::Rectilinear | Pattern::Concentric | Pattern::Archimedean => {
+            Pattern::Rectilinear
+            | Pattern::Concentric
+            | Pattern::Archimedean
+            | Pattern::Lightning => {
                 self.parallel(&[(super::angle_in(self.layer, self.params), 0.5)], spacing)
             }
         }
@@ -106,12 +120,12 @@ impl Sparse<'_> {
 
     /// Upright planes: for each family its direction and where the first lies, in spacings.
     fn parallel(&self, families: &[(f64, f64)], spacing: f64) -> Vec<FillLine> {
-        families
-            .iter()
-            .flat_map(|&(angle, first)| {
-                self.joined(&rectilinear::rows_at(&self.area, first * spacing, spacing, angle))
-            })
-            .collect()
+        let rows = families.iter().flat_map(|&(angle, first)| {
+            rectilinear::rows_at(&self.area, first * spacing, spacing, angle)
+        });
+        // All together: joins of families on their own would lie on each other along the rim.
+        let rows: Vec<Chord> = rows.collect();
+        self.joined(&rows)
     }
 
     /// Planes that slant by as much as the faces of a cube standing on its corner.
@@ -124,11 +138,14 @@ impl Sparse<'_> {
             return self.parallel(&families, spacing);
         }
         let step = (spacing / STEPS_IN_SPACING).clamp(LEAST_STEP_MM, GREATEST_STEP_MM);
-        let lines = families.iter().flat_map(|angle| {
+        let mut all = Clipped::default();
+        for angle in families {
             let across = Vector3::new(-angle.sin(), angle.cos(), FRAC_1_SQRT_2) / spacing;
-            self.field(step, move |p| p.coords.dot(&across) - CUBE_CORNER)
-        });
-        lines.collect()
+            let clipped = self.field(step, move |p| p.coords.dot(&across) - CUBE_CORNER);
+            all.chords.extend(clipped.chords);
+            all.loops.extend(clipped.loops);
+        }
+        self.clipped(&all)
     }
 
     fn gyroid(&self) -> Vec<FillLine> {
@@ -136,19 +153,19 @@ impl Sparse<'_> {
         let step = (period / STEPS_IN_PERIOD).clamp(LEAST_STEP_MM, GREATEST_STEP_MM);
         let turned = Rotation2::new(-self.params.angle);
         let gyroid = field::gyroid(period);
-        self.field(step, move |p| {
+        self.clipped(&self.field(step, move |p| {
             let flat = turned * p.xy();
             gyroid(&nalgebra::Point3::new(flat.x, flat.y, p.z))
-        })
+        }))
     }
 
-    fn field(&self, step: f64, field: impl Fn(&nalgebra::Point3<f64>) -> f64) -> Vec<FillLine> {
-        let Some(bounds) = self.area.bounds() else { return Vec::new() };
+    fn field(&self, step: f64, field: impl Fn(&nalgebra::Point3<f64>) -> f64) -> Clipped {
+        let Some(bounds) = self.area.bounds() else { return Clipped::default() };
         let corners = [bounds.min, bounds.max].map(geom::grid::mm);
         let extent = corners[1] - corners[0];
         let step = step.max(extent.max() / MOST_STEPS);
         let courses = field::courses(corners, step, |p| self.layer.height(p), field);
-        self.clipped(&clipped(&self.area, &courses))
+        clipped(&self.area, &courses)
     }
 
     fn honeycomb(&self) -> Vec<FillLine> {

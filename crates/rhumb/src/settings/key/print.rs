@@ -14,6 +14,7 @@ const PATTERNS: &[&str] = &[
     "honeycomb",
     "concentric",
     "archimedeanchords",
+    "lightning",
 ];
 
 const SOLID_PATTERNS: &[&str] =
@@ -267,8 +268,8 @@ pub(super) const KEYS: &[Key] = &[
         Print,
         "fill_pattern",
         PATTERNS,
-        "lines of sparse areas; all but the last two are fixed in space, so that layers of any shape \
-         stand on each other",
+        "lines of sparse areas; all but the last three are fixed in space, so that layers of any shape \
+         stand on each other; lightning stands only below tops, in branches that end at the walls",
     ),
     choice(
         Print,
