@@ -34,6 +34,7 @@ mod outputs;
 mod preview;
 mod program;
 mod quality;
+mod ranges;
 mod relief;
 mod rotation;
 mod roundtrip;

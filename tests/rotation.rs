@@ -143,6 +143,8 @@ fn turning_a_part_turns_its_curved_layers() {
         ["--layers=conical", "--cone-angle=-15"],
         ["--layers=spherical", "--sphere-centre=-40"],
         ["--layers=caps", "--cap-radius=60"],
+        ["--layers=planar:0-1.5,blend,conical", "--cone-angle=5"],
+        ["--layers=planar:0-1.5,spherical:1.5-4,planar", "--sphere-centre=-40"],
     ] {
         let straight = program_in(&layers, &mesh, 0.0);
         let turned = program_in(&layers, &mesh, 73.1);

@@ -7,10 +7,10 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 
-use crate::settings::Sources;
+use crate::settings::{Sources, ranges};
 
 pub use calibrate::{
-    Calibrate, CalibrateFit, CalibratePins, CalibrateScan, CalibrateShow, Procedure,
+    Calibrate, CalibrateFit, CalibratePins, CalibratePivot, CalibrateScan, CalibrateShow, Procedure,
 };
 pub use curve::{Archimedes, Curve, LoxodromeCurve};
 
@@ -253,8 +253,10 @@ impl Units {
 /// The surface that layers follow. A shorter way to write settings.
 #[derive(Debug, Clone, Default, Args)]
 pub struct LayerArguments {
-    /// The surface that layers follow; `auto` weighs planes, cones and spheres for the part
-    #[arg(long, value_name = "KIND", value_parser = ["planar", "conical", "spherical", "caps", "auto"])]
+    /// The surface that layers follow: planar, conical, spherical, caps, or auto, which weighs them for
+    /// the part; or ranges of heights in mm, such as planar:0-8,blend:8-14,conical:14- (a blend leads
+    /// from planes to curved layers, or back; the last range goes up to the top)
+    #[arg(long, value_name = "KIND|RANGES", value_parser = layers_value)]
     pub layers: Option<String>,
     /// Slope of conical layers; positive when they fall outwards, negative for bowls; `max` for the
     /// steepest that the nozzle clears
@@ -266,6 +268,20 @@ pub struct LayerArguments {
     /// Radius of the sphere whose cap is lifted from layer to layer, mm
     #[arg(long, value_name = "R")]
     pub cap_radius: Option<String>,
+}
+
+/// Reads what `--layers` is given, to say at once what is wrong with it.
+fn layers_value(text: &str) -> Result<String, String> {
+    const WORDS: [&str; 5] = ["planar", "conical", "spherical", "caps", "auto"];
+    if ranges::is_ranges(text) {
+        ranges::parse(text)?;
+    } else if !WORDS.contains(&text) {
+        return Err(format!(
+            "give one of {}, or ranges of heights such as planar:0-8,blend:8-14,conical:14-",
+            WORDS.join(", ")
+        ));
+    }
+    Ok(text.to_owned())
 }
 
 impl LayerArguments {

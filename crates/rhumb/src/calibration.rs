@@ -1,8 +1,9 @@
 //! The calibration file: how one machine misses the ideal one.
 //!
-//! TOML with tables `rail`, `column`, `plate`, `bed` and `quality`; every key may be left out.
+//! TOML with tables `rail`, `column`, `plate`, `bed`, `head` and `quality`; every key may be left out.
 //! Lengths in mm, angles in degrees. `quality` says how the numbers were found and is for people.
 
+use machine::head::Head;
 use machine::height_map::HeightMap;
 use machine::kinematics::{Alignment, BedScale};
 use machine::plate_shift::PlateShift;
@@ -25,6 +26,9 @@ pub struct Calibration {
     pub plate: Plate,
     /// How the bed counts and how high it lies.
     pub bed: Bed,
+    /// Where the tip lies under the pivot of a head that tilts.
+    #[serde(skip_serializing_if = "HeadTable::is_empty")]
+    pub head: HeadTable,
     /// How good the numbers are.
     pub quality: toml::Table,
 }
@@ -78,12 +82,60 @@ pub struct Bed {
     pub probes: Vec<[f64; 3]>,
 }
 
+/// `[head]`
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HeadTable {
+    /// From the pivot to the tip, mm; that of the printer profile where it is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pivot_length_mm: Option<f64>,
+    /// How far the tip lies beside the line down from the pivot, along and across the rail, mm; of heads
+    /// with two axes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset_mm: Option<[f64; 2]>,
+}
+
+impl HeadTable {
+    fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Puts it into the head of a printer.
+    fn apply(&self, printer: &mut Printer) -> Result<(), Failure> {
+        if self.is_empty() {
+            return Ok(());
+        }
+        let Some(Head::Tilting(head)) = &mut printer.head else {
+            return Err(Failure::new(
+                "ConfigConflict",
+                "head.pivot_length_mm: this printer has no head that tilts about a pivot"
+                    .to_owned(),
+            ));
+        };
+        head.pivot_length = self.pivot_length_mm.unwrap_or(head.pivot_length);
+        if let Some(offset) = self.offset_mm {
+            if head.axes.len() < 2 {
+                return Err(Failure::new(
+                    "ConfigConflict",
+                    "head.offset_mm: heads with one tilt have their tip below the pivot".to_owned(),
+                ));
+            }
+            head.offset = Vector2::from(offset);
+        }
+        Ok(())
+    }
+}
+
 /// A rail that misses the axis by more must be put right with a spanner, mm.
 const GREATEST_MISS_MM: f64 = 1.5;
 
 /// Largest misplacement of anything else, mm, and lean, mm per mm: beyond it a number is a mistake.
 const GREATEST_OFFSET_MM: f64 = 50.0;
 const GREATEST_LEAN: f64 = 0.2;
+
+/// Least and greatest distance from pivot to tip, mm, as the setting has them.
+const LEAST_PIVOT_MM: f64 = 1.0;
+const GREATEST_PIVOT_MM: f64 = 1000.0;
 
 /// Greatest play of the bed's drive, degrees.
 const GREATEST_PLAY_DEG: f64 = 10.0;
@@ -109,6 +161,18 @@ impl Calibration {
 
     fn check(&self, name: &str) -> Result<(), Failure> {
         let [sx, sy] = self.plate.shift_mm.unwrap_or_default();
+        let [ox, oy] = self.head.offset_mm.unwrap_or_default();
+        if let Some(length) = self.head.pivot_length_mm
+            && !(LEAST_PIVOT_MM..=GREATEST_PIVOT_MM).contains(&length)
+        {
+            return Err(Failure::new(
+                "ConfigRange",
+                format!(
+                    "{name}: head.pivot_length_mm = {length} is out of range; it is from \
+                     {LEAST_PIVOT_MM} to {GREATEST_PIVOT_MM}"
+                ),
+            ));
+        }
         let bounded = [
             ("rail.a_mm", self.rail.a_mm, GREATEST_OFFSET_MM),
             ("rail.b_mm", self.rail.b_mm, GREATEST_MISS_MM),
@@ -118,6 +182,8 @@ impl Calibration {
             ("plate.ey_mm", self.plate.ey_mm, GREATEST_OFFSET_MM),
             ("plate.shift_mm", sx, GREATEST_OFFSET_MM),
             ("plate.shift_mm", sy, GREATEST_OFFSET_MM),
+            ("head.offset_mm", ox, GREATEST_OFFSET_MM),
+            ("head.offset_mm", oy, GREATEST_OFFSET_MM),
             ("plate.psi_deg", self.plate.psi_deg, 360.0),
             ("bed.theta_zero_deg", self.bed.theta_zero_deg, 360.0),
             ("bed.backlash_deg", self.bed.backlash_deg, GREATEST_PLAY_DEG),
@@ -147,7 +213,7 @@ impl Calibration {
     /// # Errors
     ///
     /// `ConfigRange` for probes that are no map of a bed, `ConfigConflict` for play of a bed under a head
-    /// that turns the nozzle.
+    /// that turns the nozzle, and for a pivot of a head that has none.
     pub fn apply(&self, printer: &mut Printer, fade: f64) -> Result<(), Failure> {
         if printer.head.is_some() && self.bed.backlash_deg != 0.0 {
             return Err(Failure::new(
@@ -159,6 +225,7 @@ impl Calibration {
                 ),
             ));
         }
+        self.head.apply(printer)?;
         let shift = self.plate.shift_mm.unwrap_or_default();
         let shift = PlateShift { by: Vector2::from(shift) };
         printer.alignment = Alignment {
@@ -233,11 +300,35 @@ mod tests {
     }
 
     #[test]
+    fn the_pivot_of_a_head_reaches_the_machine_or_is_refused() {
+        let printer = |head: &str| {
+            let mut settings = Settings::defaults();
+            settings.set(&format!("head={head}")).unwrap();
+            Job::resolve(&settings).unwrap().printer
+        };
+        let read = |text: &str| Calibration::read(text.as_bytes(), "c").unwrap();
+        let both = read("[head]\npivot_length_mm = 47.3\noffset_mm = [0.2, -0.1]");
+        let mut two = printer("two-axis");
+        both.apply(&mut two, 0.0).unwrap();
+        let Some(Head::Tilting(head)) = &two.head else { panic!() };
+        assert_eq!((head.pivot_length, head.offset), (47.3, Vector2::new(0.2, -0.1)));
+        let class = |calibration: &Calibration, head: &str| {
+            calibration.apply(&mut printer(head), 0.0).unwrap_err().class()
+        };
+        assert_eq!(class(&both, "fixed"), "ConfigConflict");
+        assert_eq!(class(&both, "tilt"), "ConfigConflict");
+        assert!(read("[head]\npivot_length_mm = 47.3").apply(&mut printer("tilt"), 0.0).is_ok());
+    }
+
+    #[test]
     fn what_no_machine_can_be_is_refused() {
         let class = |text: &str| Calibration::read(text.as_bytes(), "c").unwrap_err().class();
         assert_eq!(class("[rail]\nb_mm = 1.6"), "ConfigRange");
         assert_eq!(class("[rail]\na_mm = nan"), "ConfigRange");
         assert_eq!(class("[bed]\nbacklash_deg = -1"), "ConfigRange");
+        assert_eq!(class("[head]\npivot_length_mm = 0"), "ConfigRange");
+        assert_eq!(class("[head]\npivot_length_mm = nan"), "ConfigRange");
+        assert_eq!(class("[head]\noffset_mm = [0, 60]"), "ConfigRange");
         assert_eq!(class("[rail]\nc_mm = 1"), "ConfigSyntax");
         assert_eq!(class("[rails]\na_mm = 1"), "ConfigSyntax");
         assert_eq!(class("[rail"), "ConfigSyntax");

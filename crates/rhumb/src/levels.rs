@@ -6,10 +6,13 @@ use std::fmt::Write as _;
 use machine::gcode::decimal;
 use mesh::flats::{Facing, Flat, flats};
 use mesh::mesh::Mesh;
-use slicer::level::{Extent, FlatFace, Level, Snap, adaptive, cost, misses, schedule};
+use slicer::level::{
+    Extent, FlatFace, Level, ScheduleParams, Snap, adaptive, cost, misses, schedule,
+};
 use slicer::surface::LayerSurface;
 
 use crate::failure::Failure;
+use crate::ranges::LaidSpan;
 use crate::report::{self, Warning};
 use crate::settings::Job;
 
@@ -81,6 +84,10 @@ pub struct Layout {
     pub flats: Vec<MetFlat>,
     /// Flat faces facing up that planar layers were to finish, and that curved ones end on in steps.
     pub stepped: Vec<SteppedFlat>,
+    /// What the ranges of heights came to be, where layers are given by those.
+    pub spans: Vec<LaidSpan>,
+    /// The words of those that begin above the part, or within a blend that it ends in.
+    pub unreached: Vec<&'static str>,
     /// What is still a hit, mm: half an increment, and the rounding of a level.
     pub tolerance: f64,
 }
@@ -114,8 +121,26 @@ pub fn layout(part: &Mesh, surface: &dyn LayerSurface, job: &Job) -> Result<Layo
         levels,
         flats,
         stepped: Vec::new(),
+        spans: Vec::new(),
+        unreached: Vec::new(),
         tolerance: params.increment / 2.0 + ROUNDING_MM,
     })
+}
+
+/// Lays out planar layers of the wanted height, from 0 to `height`; the first is `first` thick.
+///
+/// # Errors
+///
+/// `LimitExceeded`.
+pub(crate) fn planes(
+    height: f64,
+    flats: &[FlatFace],
+    first: f64,
+    job: &Job,
+) -> Result<Vec<Level>, Failure> {
+    check_cost(height, job)?;
+    let params = ScheduleParams { first_layer_height: first, adaptive: None, ..job.schedule };
+    Ok(schedule(&Extent { top: height, flats, caps: &[] }, &params))
 }
 
 /// Refuses a number of layers that no printer lays.
@@ -203,6 +228,14 @@ impl Layout {
                 places.join("; ")
             );
             warnings.push(Warning { code: "FlatTopsStepped".into(), message });
+        }
+        if !self.unreached.is_empty() {
+            let message = format!(
+                "the part ends below the ranges with {} layers: begin them lower, or let the blend \
+                 below them end lower",
+                self.unreached.join(", ")
+            );
+            warnings.push(Warning { code: "RangeUnreached".into(), message });
         }
         if snap == Snap::Off {
             return warnings;

@@ -58,6 +58,7 @@ pub mod pipeline;
 pub mod place;
 pub mod program_text;
 pub mod progress;
+pub mod ranges;
 pub mod report;
 pub mod settings;
 mod stack;

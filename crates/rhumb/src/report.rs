@@ -88,6 +88,9 @@ pub struct OrientationCandidate {
 pub struct Layers {
     /// The surface that they follow.
     pub kind: &'static str,
+    /// Ranges of heights, where layers are given by those.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ranges: Vec<LayerRange>,
     /// How many.
     pub count: usize,
     /// Upper levels.
@@ -114,6 +117,23 @@ pub struct Layers {
     pub overhang_mm2: Option<f64>,
     /// Islands that begin in mid-air, with nothing below.
     pub floating: Vec<FloatingIsland>,
+}
+
+/// A range of heights with layers of its own.
+#[derive(Debug, Clone, Serialize)]
+pub struct LayerRange {
+    /// The word for its layers.
+    pub kind: &'static str,
+    /// What they follow.
+    pub surface: String,
+    /// Where its highest places begin.
+    pub from_mm: f64,
+    /// Where they end.
+    pub to_mm: f64,
+    /// Its thinnest layer, along the normal, where nothing ends it.
+    pub thinnest_mm: f64,
+    /// Its thickest.
+    pub thickest_mm: f64,
 }
 
 /// Surfaces that were weighed for a part.

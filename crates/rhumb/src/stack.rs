@@ -9,7 +9,8 @@ use geom::region::Region;
 use mesh::topology::Solid;
 use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
-use slicer::chart::{Chart, carried, carried_point, carried_to_cone};
+use slicer::blend::Side;
+use slicer::chart::{Chart, carried, carried_point, carried_to_side};
 use slicer::compensation::{CompensationParams, compensated};
 use slicer::infill::Pattern;
 use slicer::infill::lightning::{Branches, Stratum, grow};
@@ -18,9 +19,8 @@ use slicer::level::Level;
 use slicer::lift::Lift;
 use slicer::section::{Cutter, Section, Tears};
 use slicer::skins::{Neighbours, SKIN_TOLERANCE_MM};
-use slicer::stacking::{Side, Stair};
+use slicer::stacking::Stair;
 use slicer::support::{Column, Shade, SupportParams, hanging};
-use slicer::surface::LayerSurface;
 
 use crate::failure::Failure;
 use crate::filling::WINDOW;
@@ -172,7 +172,8 @@ impl<'a> Stack<'a> {
             return cutter.section(k, tolerance);
         }
         let Some(middle) = self.middle(k) else { return Section::default() };
-        Cutter::at_levels(self.solid, &middle.cone, vec![middle.level]).section(0, tolerance)
+        Cutter::at_levels(self.solid, middle.sheet.surface(), vec![middle.level])
+            .section(0, tolerance)
     }
 
     /// The surface halfway through a layer with a surface of its own.
@@ -322,7 +323,7 @@ impl<'a> Stack<'a> {
         let Stage { surface, levels, floor, ceiling, .. } = self.stage;
         let level = levels[k];
         if let Some(sides) = &self.stage.morph {
-            let (surface, below) = (&sides[k + 1].cone, Some(sides[k]));
+            let (surface, below) = (sides[k + 1].sheet.surface(), Some(sides[k]));
             return Lift { surface, level, floor: None, ceiling: None, stair: None, below };
         }
         let stair = self.stair.filter(|_| k == self.stage.printed.start);
@@ -351,15 +352,20 @@ impl<'a> Stack<'a> {
     ) -> Cow<'r, Region> {
         let levels = &self.stage.levels;
         if let Some(sides) = &self.stage.morph {
-            let upper = &sides[k + 1];
-            let half = |r: f64| {
-                let at = Point3::new(r, 0.0, upper.cone.height(upper.level, r));
-                lift.thickness(&at) / 2.0
+            let (upper, above) = (lift.surface, sides[k + 1].level);
+            // Half the thickness along the normal of the upper side, away from the axis.
+            let outwards = |r: f64| {
+                let at = Point3::new(r, 0.0, upper.height(above, r));
+                let way = lift.thickness(&at) / 2.0 * upper.normal(&at).x;
+                if way.is_finite() { way } else { 0.0 }
             };
             // Between sides that are not alike regions are compared straight up and down: side faces
             // then lie on top of each other.
-            let middle = self.middle(i);
-            let carried = middle.map(|m| carried_to_cone(region, [&m.cone, &upper.cone], half));
+            let chart = upper.chart(above);
+            let carried = self.middle(i).map(|middle| {
+                let from = middle.sheet.surface().chart(middle.level);
+                carried_to_side(region, [&from, &chart], outwards)
+            });
             return Cow::Owned(carried.unwrap_or_default());
         }
         if lift.surface.form().is_flat() {

@@ -7,8 +7,10 @@
 //! of them fills the wedges between the curved layers and its own plane, and the last ends on the
 //! face. Where the part goes on above, curved layers begin anew on that floor.
 //!
-//! With `blend = morph` cones do not begin as wedges: between base and cones lie layers that are each a
-//! little steeper than the one below, as many as the limits of a layer's thickness ask for.
+//! With `blend = morph` curved layers do not begin as wedges: between base and them lie layers that are
+//! each a little steeper than the one below, as many as the limits of a layer's thickness ask for.
+//!
+//! What lies where may also be said by [ranges](crate::ranges) of heights.
 //!
 //! A stage knows more levels than it prints: what lies beyond is cut all the same, because it
 //! decides where the printed ones are bottoms and tops. The base is part of the same solid, so its
@@ -21,17 +23,19 @@ use mesh::mesh::Mesh;
 use mesh::topology::Solid;
 use nalgebra::{Point3, Vector3};
 use plan::tilt::{Field, Tilt, TiltParams};
+use slicer::blend::{Sheet, Side};
 use slicer::clearance::{LayerOrder, Uphill, steepest_slope};
 use slicer::level::{Level, Snap};
 use slicer::lift::LEAST_WEDGE_SHARE;
-use slicer::stacking::{Side, Stair};
+use slicer::stacking::Stair;
 use slicer::support::MARGIN_MM;
 use slicer::surface::{Caps, Cone, Extent, Form, LayerSurface, Plane, Spheres, SurfaceError};
 
-use crate::blend;
+use crate::blend::{self, Curved, Laid, Way};
 use crate::failure::Failure;
 use crate::flat_tops::{Finish, Slab, Stand, finish};
 use crate::levels::{self, Layout, MetFlat};
+use crate::ranges;
 use crate::settings::Job;
 
 /// The surface that layers follow, as the user names it.
@@ -105,7 +109,7 @@ impl Stage {
     #[must_use]
     pub fn normal(&self, k: usize, p: &Point3<f64>) -> Vector3<f64> {
         match self.morph.as_ref().and_then(|sides| sides.get(k + 1)) {
-            Some(side) => side.cone.normal(p),
+            Some(side) => side.sheet.surface().normal(p),
             None => self.surface.normal(p),
         }
     }
@@ -125,6 +129,13 @@ impl Stage {
         })
     }
 
+    /// The greatest height that curved layers below these planar ones are laid at, mm: the first layer on
+    /// them is nowhere thinner than a wedge may be.
+    pub(crate) fn lowest_ground(&self) -> f64 {
+        let first = &self.levels[self.printed.start];
+        first.upper - LEAST_WEDGE_SHARE * first.thickness()
+    }
+
     /// The highest place of the layers printed, within `radius` of the axis, mm.
     fn height_within(&self, radius: f64) -> f64 {
         let Some(last) = self.printed.end.checked_sub(1).and_then(|last| self.levels.get(last))
@@ -137,7 +148,7 @@ impl Stage {
     /// The form of layer `k`.
     pub(crate) fn form(&self, k: usize) -> Form {
         match &self.morph {
-            Some(sides) => sides[k + 1].cone.form(),
+            Some(sides) => sides[k + 1].sheet.surface().form(),
             None => self.surface.form(),
         }
     }
@@ -145,7 +156,10 @@ impl Stage {
     /// What layer `k` is called in the program.
     pub(crate) fn describe(&self, k: usize) -> String {
         match &self.morph {
-            Some(sides) => LayerKind::Conical(sides[k + 1].cone.angle()).describe(),
+            Some(sides) => match &sides[k + 1].sheet {
+                Sheet::Cone(cone) => LayerKind::Conical(cone.angle()).describe(),
+                Sheet::Spheres(spheres) => LayerKind::Spherical(spheres.centre_z()).describe(),
+            },
             None => self.kind.describe(),
         }
     }
@@ -159,26 +173,19 @@ impl Stage {
 pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure> {
     let part = solid.mesh();
     let layout = levels::layout(part, &Plane, job)?;
-    if job.layers == LayerKind::Planar {
-        let levels = layout.levels.clone();
-        let planar = Stage {
-            surface: Box::new(Plane),
-            kind: LayerKind::Planar,
-            printed: 0..levels.len(),
-            levels,
-            floor: None,
-            ceiling: None,
-            morph: None,
-        };
-        return Ok((vec![planar], layout));
+    if !job.spans.is_empty() {
+        return ranges::stages(solid, job, layout);
     }
-    let kind = within_clearance(solid, job)?;
+    if job.layers == LayerKind::Planar {
+        return Ok((vec![flat(layout.levels.clone())], layout));
+    }
+    let kind = within_clearance(solid, job, job.layers)?;
     let surface = kind.surface().map_err(|error| unfit(&error))?;
     surface.fits(&extent(part)).map_err(|error| unfit(&error))?;
     let base = base(job);
     let floor = base.printed.end.checked_sub(1).map_or(0.0, |last| base.levels[last].upper);
-    let blended = blend::stage(part, kind, floor, job)?;
-    // Where the cones begin on the axis, when they do not begin on the floor.
+    let blended = if job.morph { grown(part, kind, floor, job)? } else { None };
+    // Where they begin on the axis, when they do not begin on the floor.
     let start = blended.as_ref().and_then(|stage| stage.levels.get(stage.printed.end - 1));
     let start = start.map(|last| last.upper);
     let stand = blended.as_ref().map_or(floor, |stage| stage.height_within(extent(part).radius));
@@ -199,6 +206,60 @@ pub fn stages(solid: &Solid, job: &Job) -> Result<(Vec<Stage>, Layout), Failure>
     Ok((between(part, kind, below, (floor, start), &finish.slabs, job)?, layout))
 }
 
+/// Planar layers that are all printed.
+pub(crate) fn flat(levels: Vec<Level>) -> Stage {
+    Stage {
+        surface: Box::new(Plane),
+        kind: LayerKind::Planar,
+        printed: 0..levels.len(),
+        levels,
+        floor: None,
+        ceiling: None,
+        morph: None,
+    }
+}
+
+/// The fewest layers that lead from the planar ones, which end at `floor` mm, to curved ones; `None` where
+/// these are planes.
+fn grown(part: &Mesh, kind: LayerKind, floor: f64, job: &Job) -> Result<Option<Stage>, Failure> {
+    let curved = Curved { kind, reach: blend_reach(part, None, job) };
+    let sides = blend::shortest(&curved, floor, job)?;
+    if sides.is_empty() {
+        return Ok(None);
+    }
+    let ground = Side::plane(floor).map_err(|error| unfit(&error))?;
+    let laid = Laid { sides: &sides, ground, way: Way::Up, before: job.base_layers };
+    blend::stage(&curved, &laid, job).map(Some)
+}
+
+/// How far from the axis a blend has layers, mm: as far as there is material, or supports; below `height`
+/// mm where that is given.
+pub(crate) fn blend_reach(part: &Mesh, height: Option<f64>, job: &Job) -> f64 {
+    match height {
+        _ if job.paths.support.is_some() => extent(part).radius + MARGIN_MM,
+        Some(height) => radius_below(part, height),
+        None => extent(part).radius,
+    }
+}
+
+/// The greatest distance from the axis of a part's outside below a height, mm.
+fn radius_below(part: &Mesh, height: f64) -> f64 {
+    let mut radius = 0.0_f64;
+    for triangle in &part.triangles {
+        for k in 0..3 {
+            let [a, b] = [k, (k + 1) % 3].map(|k| part.vertices[triangle[k] as usize]);
+            if a.z <= height {
+                radius = radius.max(a.x.hypot(a.y));
+            }
+            if (a.z < height) != (b.z < height) {
+                let at = a.lerp(&b, (height - a.z) / (b.z - a.z));
+                radius = radius.max(at.x.hypot(at.y));
+            }
+        }
+    }
+    radius
+}
+
 /// How far a flat face may lie from the end of a slab and be met by it, mm: what its own vertices differ
 /// by.
 const TOP_MM: f64 = 1e-3;
@@ -216,7 +277,8 @@ fn between(
     for slab in slabs {
         if slab.on_curved {
             let ceiling = slab.bottom + (1.0 - LEAST_WEDGE_SHARE) * slab.step();
-            let space = Space { floor, start, ceiling: Some(ceiling), index: count(&all) };
+            let space =
+                Space { floor, start, end: None, ceiling: Some(ceiling), index: count(&all) };
             all.push(curved(part, kind, &space, job)?);
         }
         all.push(planar(slab, count(&all), job));
@@ -224,7 +286,7 @@ fn between(
     }
     // Above the highest point there is nothing left to do.
     if part.bounds().max.z > floor + TOP_MM {
-        let space = Space { floor, start, ceiling: None, index: count(&all) };
+        let space = Space { floor, start, end: None, ceiling: None, index: count(&all) };
         all.push(curved(part, kind, &space, job)?);
     }
     Ok(all)
@@ -243,16 +305,7 @@ fn planar(slab: &Slab, index: usize, job: &Job) -> Stage {
             upper: bound(k + 1),
         })
         .collect();
-    let kind = LayerKind::Planar;
-    Stage {
-        surface: Box::new(Plane),
-        kind,
-        levels,
-        printed,
-        floor: None,
-        ceiling: None,
-        morph: None,
-    }
+    Stage { printed, ..flat(levels) }
 }
 
 /// How deep the nozzle may press into what is laid, mm: a quarter of a usual layer, which a soft
@@ -260,7 +313,11 @@ fn planar(slab: &Slab, index: usize, job: &Job) -> Stage {
 pub(crate) const GOUGE_MM: f64 = 0.05;
 
 /// Refuses layers too steep for the nozzle, or lowers a cone where the user asked for that.
-fn within_clearance(solid: &Solid, job: &Job) -> Result<LayerKind, Failure> {
+pub(crate) fn within_clearance(
+    solid: &Solid,
+    job: &Job,
+    kind: LayerKind,
+) -> Result<LayerKind, Failure> {
     let uphill = Uphill {
         extent: extent(solid.mesh()).radius,
         thickness: job.schedule.layer_height,
@@ -268,11 +325,11 @@ fn within_clearance(solid: &Solid, job: &Job) -> Result<LayerKind, Failure> {
         order: LayerOrder::LowToHigh,
     };
     let most = job.nozzle.steepest(&uphill);
-    if let (LayerKind::Conical(angle), true) = (job.layers, job.lower_cone) {
+    if let (LayerKind::Conical(angle), true) = (kind, job.lower_cone) {
         let most = most + steepest_lean(solid, angle, job);
         return Ok(LayerKind::Conical(most.min(angle.abs()).copysign(angle)));
     }
-    let surface = job.layers.surface().map_err(|error| unfit(&error))?;
+    let surface = kind.surface().map_err(|error| unfit(&error))?;
     let slope = match Field::of(&job.printer, job.plan.tilt) {
         // Seen from the nozzle, which leans.
         Some(field) => {
@@ -286,7 +343,7 @@ fn within_clearance(solid: &Solid, job: &Job) -> Result<LayerKind, Failure> {
         None => steepest_slope(solid, &*surface),
     };
     if slope <= most {
-        return Ok(job.layers);
+        return Ok(kind);
     }
     let degrees = |angle: f64| machine::gcode::decimal(angle.to_degrees(), 1);
     let (slope, most) = (degrees(slope), degrees(most));
@@ -294,10 +351,10 @@ fn within_clearance(solid: &Solid, job: &Job) -> Result<LayerKind, Failure> {
         "OutOfEnvelope",
         format!(
             "{} layers rise by {slope}° in this part, and the nozzle clears at most {most}°",
-            job.layers.word()
+            kind.word()
         ),
     )
-    .hint(match job.layers {
+    .hint(match kind {
         LayerKind::Conical(_) => format!(
             "use --cone-angle max or up to {most}, or describe a slimmer nozzle in the printer \
              profile (nozzle_flat_radius_mm, nozzle_half_angle_deg, nozzle_block_height_mm)"
@@ -338,7 +395,7 @@ pub(crate) fn extent(part: &Mesh) -> Extent {
 }
 
 /// The planar layers under the curved ones.
-fn base(job: &Job) -> Stage {
+pub(crate) fn base(job: &Job) -> Stage {
     let params = &job.schedule;
     let bound = |i: usize| match i.checked_sub(1) {
         None => 0.0,
@@ -348,16 +405,7 @@ fn base(job: &Job) -> Stage {
     let levels = (0..count)
         .map(|index| Level { index, lower: bound(index), upper: bound(index + 1) })
         .collect();
-    let kind = LayerKind::Planar;
-    Stage {
-        surface: Box::new(Plane),
-        kind,
-        levels,
-        printed: 0..job.base_layers,
-        floor: None,
-        ceiling: None,
-        morph: None,
-    }
+    Stage { printed: 0..job.base_layers, ..flat(levels) }
 }
 
 /// The least level of a bowl above the floor: the first layer is as thick as the others at the rim
@@ -403,19 +451,26 @@ fn area_on_level(part: &Mesh, surface: &dyn LayerSurface, level: f64) -> f64 {
 }
 
 /// Where curved layers go.
-struct Space {
+pub(crate) struct Space {
     /// Height of the floor below, mm.
-    floor: f64,
+    pub(crate) floor: f64,
     /// The level that they begin at, where it is not the floor that they begin on.
-    start: Option<f64>,
+    pub(crate) start: Option<f64>,
+    /// The level that they end at, under a blend.
+    pub(crate) end: Option<f64>,
     /// Height that they end at, mm; `None` where the part ends them.
-    ceiling: Option<f64>,
+    pub(crate) ceiling: Option<f64>,
     /// How many layers are below.
-    index: usize,
+    pub(crate) index: usize,
 }
 
-fn curved(part: &Mesh, kind: LayerKind, space: &Space, job: &Job) -> Result<Stage, Failure> {
-    let Space { floor, start, ceiling, .. } = *space;
+pub(crate) fn curved(
+    part: &Mesh,
+    kind: LayerKind,
+    space: &Space,
+    job: &Job,
+) -> Result<Stage, Failure> {
+    let Space { floor, start, end, ceiling, .. } = *space;
     let surface = kind.surface().map_err(|error| unfit(&error))?;
     let Extent { radius, .. } = extent(part);
     let top = part.bounds().max.z;
@@ -435,14 +490,22 @@ fn curved(part: &Mesh, kind: LayerKind, space: &Space, job: &Job) -> Result<Stag
     let greatest = part.vertices.iter().map(|p| surface.level(p)).fold(level(0.0, top), f64::max);
     let below_ceiling = |z: f64| level(0.0, z).max(level(radius, z));
     let greatest = ceiling.map_or(f64::INFINITY, below_ceiling).min(greatest);
+    let greatest = end.unwrap_or(greatest);
     let step = surface.level_step(job.schedule.layer_height);
-    let count = ((greatest - least) / step - WHOLE_LAYER).ceil().max(1.0);
+    let layers = (greatest - least) / step;
+    let count = match end {
+        // The part may end within the blend below.
+        _ if greatest <= least => 0.0,
+        Some(_) => layers.round().max(1.0),
+        None => (layers - WHOLE_LAYER).ceil().max(1.0),
+    };
     levels::check_count(count)?;
     // A face that is a layer itself, such as that of a lens, is met by the last one.
     let ends_on_face = job.schedule.snap != Snap::Off
         && ceiling.is_none()
         && area_on_level(part, &*surface, greatest) >= job.least_flat_mm2.max(LEAST_FACE_MM2);
-    let step = if ends_on_face { (greatest - least) / count } else { step };
+    let is_fixed = (ends_on_face || end.is_some()) && count > 0.0;
+    let step = if is_fixed { (greatest - least) / count } else { step };
     let skins = &job.paths.skins;
     let below = skins.bottom_layers.max(1);
     let printed = below..below + count as usize;

@@ -11,9 +11,10 @@ use crate::choice::Choice;
 use crate::pipeline::{Outcome, part};
 use crate::place::volume;
 use crate::program_text::duration;
+use crate::ranges::LaidSpan;
 use crate::report::{
-    FloatingIsland, Layers, MeshHealth, Model, Orientation, OrientationCandidate, Print, Report,
-    SlowFlow, Verify, Weighed, WeighedSurface, tidy,
+    FloatingIsland, LayerRange, Layers, MeshHealth, Model, Orientation, OrientationCandidate,
+    Print, Report, SlowFlow, Verify, Weighed, WeighedSurface, tidy,
 };
 use crate::settings::Job;
 use machine::gcode::decimal;
@@ -32,6 +33,7 @@ pub fn report(
     let volume = volume(part);
     let bounds = part.bounds();
     let corner = |p: Point3<f64>| [p.x, p.y, p.z];
+    let spans = &outcome.layout.spans;
     let supports = Some(totals.supports()).filter(|volume| *volume > 0.0);
     Report {
         rhumb: env!("CARGO_PKG_VERSION"),
@@ -52,7 +54,8 @@ pub fn report(
         },
         orientation: orientation(outcome, job, ranks),
         layers: Layers {
-            kind: outcome.layers.word(),
+            kind: if spans.is_empty() { outcome.layers.word() } else { "ranges" },
+            ranges: spans.iter().map(layer_range).collect(),
             count: outcome.layout.levels.len(),
             levels_mm: outcome.layout.levels.iter().map(|level| tidy(level.upper)).collect(),
             heights_mm: outcome.heights.iter().map(|&height| tidy(height)).collect(),
@@ -181,8 +184,13 @@ pub fn text(
     );
     row("layers", format!("{} of {} mm", report.layers.count, heights(report, job)));
     outcome.choice.iter().flat_map(weighed_rows).for_each(|(label, text)| row(label, text));
+    for range in &report.layers.ranges {
+        row("range", range_words(range));
+    }
     if let Some(overhang) = outcome.overhang {
-        row("surface", outcome.layers.describe());
+        if report.layers.ranges.is_empty() {
+            row("surface", outcome.layers.describe());
+        }
         row(
             "overhang",
             format!(
@@ -242,6 +250,34 @@ fn judged(verdict: Option<&Verdict>) -> Vec<String> {
     }
     let findings = verdict.findings.iter().map(ToString::to_string);
     findings.chain(verdict.omitted.iter().map(ToString::to_string)).collect()
+}
+
+fn layer_range(span: &LaidSpan) -> LayerRange {
+    let ([from, to], [thin, thick]) = (span.heights, span.thickness);
+    LayerRange {
+        kind: span.word,
+        surface: span.follows.clone(),
+        from_mm: tidy(from),
+        to_mm: tidy(to),
+        thinnest_mm: tidy(thin),
+        thickest_mm: tidy(thick),
+    }
+}
+
+fn range_words(range: &LayerRange) -> String {
+    let mm = |value: f64| decimal(value, 2);
+    let thickness = if range.thickest_mm - range.thinnest_mm < 0.005 {
+        mm(range.thinnest_mm)
+    } else {
+        format!("{} to {}", mm(range.thinnest_mm), mm(range.thickest_mm))
+    };
+    let (from, to) = (mm(range.from_mm), mm(range.to_mm));
+    let name = if range.kind == "blend" {
+        format!("blend {}", range.surface)
+    } else {
+        range.surface.clone()
+    };
+    format!("{from} to {to} mm: {name}, {thickness} mm thick")
 }
 
 /// The heights of the layers above the first, and the first where it is another.

@@ -233,3 +233,59 @@ fn worst_off_square(settings: &Settings, job: &Job, machine: &Job) -> f64 {
     let half = 20.0 - 0.45 / 2.0;
     places.iter().map(|p| (p.x.abs().max(p.y.abs()) - half).abs()).fold(0.0, f64::max)
 }
+
+/// What a calibration says of the pivot.
+fn pivot_of(file: &Path) -> (f64, Option<[f64; 2]>, f64) {
+    let found = Calibration::read(&std::fs::read(file).expect("written"), "c").expect("readable");
+    let sd = found.quality["pivot_length_sd_mm"].as_float().expect("a number");
+    (found.head.pivot_length_mm.expect("a length"), found.head.offset_mm, sd)
+}
+
+#[test]
+fn a_pivot_is_found_from_touches_within_three_standard_errors() {
+    let folder = folder("pivot");
+    for (printer, truth, seed) in [
+        ("polar-two-axis", "47.31,0.42,-0.63", "1"),
+        ("polar-two-axis", "44.2", "2"),
+        ("tilt-core-r-theta", "41.77", "3"),
+    ] {
+        let simulate = ["calibrate", "pivot", "--printer", printer, "-o", "log.csv"];
+        let written =
+            rhumb(&folder, &[&simulate[..], &["--simulate", truth, "--seed", seed]].concat());
+        assert_eq!(written.status.code(), Some(0), "{}", text(&written.stderr));
+        let fitted = ["calibrate", "pivot", "log.csv", "--printer", printer, "-o", "cal.toml"];
+        let fitted = rhumb(&folder, &fitted);
+        assert_eq!(fitted.status.code(), Some(0), "{}", text(&fitted.stderr));
+        assert!(text(&fitted.stdout).contains("from pivot to tip"), "{}", text(&fitted.stdout));
+        let truth: Vec<f64> = truth.split(',').map(|n| n.parse().expect("a number")).collect();
+        let (length, offset, sd) = pivot_of(&folder.join("cal.toml"));
+        assert!((length - truth[0]).abs() <= 3.0 * sd && sd < 0.02, "{printer}: {length} ± {sd}");
+        assert_eq!(offset.is_some(), printer == "polar-two-axis");
+        for (k, found) in offset.into_iter().flatten().enumerate() {
+            let off = (found - truth.get(k + 1).unwrap_or(&0.0)).abs();
+            assert!(off < 0.06, "{printer}: {found}");
+        }
+    }
+}
+
+#[test]
+fn what_tells_no_pivot_is_refused() {
+    let folder = folder("no-pivot");
+    let run = |arguments: &[&str]| {
+        let ran = rhumb(&folder, &[&["calibrate", "pivot"], arguments].concat());
+        (ran.status.code(), text(&ran.stderr))
+    };
+    let printer = ["--printer", "polar-two-axis"];
+    let (code, _) =
+        run(&[&["--simulate", "45", "--tilt", "2", "-o", "flat.csv"], &printer[..]].concat());
+    assert_eq!(code, Some(0));
+    let (code, said) = run(&[&["flat.csv"], &printer[..]].concat());
+    assert!(code == Some(4) && said.contains("add touches"), "{said}");
+    assert!(said.contains("B = -30° and B = 30°"), "{said}");
+    let (code, said) = run(&["flat.csv"]);
+    assert!(code == Some(6) && said.contains("no head"), "{said}");
+    std::fs::write(folder.join("bad.csv"), "s_mm,theta_deg,z_mm,b_deg\n1,2,x,4\n")
+        .expect("written");
+    let (code, said) = run(&[&["bad.csv"], &printer[..]].concat());
+    assert!(code == Some(4) && said.contains("line 2"), "{said}");
+}

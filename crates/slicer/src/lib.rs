@@ -13,6 +13,7 @@
 
 pub mod adhesion;
 pub mod bead;
+pub mod blend;
 pub mod bridge;
 pub mod chart;
 pub mod clearance;

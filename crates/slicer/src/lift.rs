@@ -10,8 +10,9 @@ use geom::region::{Fill, Region};
 use nalgebra::{Point2, Point3, center};
 
 use crate::bead::Bead;
+use crate::blend::Side;
 use crate::level::Level;
-use crate::stacking::{Side, Stair, WedgeRule};
+use crate::stacking::{Stair, WedgeRule};
 use crate::surface::LayerSurface;
 use crate::toolpath::{Overhang, Station};
 

@@ -1,5 +1,4 @@
-//! How thick the material is at a place of a layer: wedges on the bed, and cones that grow out of
-//! planes.
+//! How thick the material is at a place of a layer that begins on a flat base, or ends below one.
 //!
 //! Curved layers meet a flat bed, or the planar layers that they stand on, in wedges. The *depth*
 //! of a place is its distance from that base along the normal of the layer. Where the depth is less
@@ -9,7 +8,7 @@
 
 use nalgebra::Point3;
 
-use crate::surface::{Cone, LayerSurface, SurfaceError};
+use crate::surface::LayerSurface;
 
 /// What a bead may be where layers begin on a flat base.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -157,85 +156,10 @@ pub fn depth(surface: &dyn LayerSurface, p: &Point3<f64>, base: f64) -> f64 {
     (p.z - base) / surface.slope_cos(p)
 }
 
-/// A side of a layer of a [`blend`]: a cone and where it lies.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Side {
-    /// The cone.
-    pub cone: Cone,
-    /// Its height on the axis, mm.
-    pub level: f64,
-}
-
-impl Side {
-    /// Returns the side halfway between this one and another.
-    ///
-    /// # Errors
-    ///
-    /// [`SurfaceError::NotFinite`] when either slope is none.
-    pub fn halfway(&self, to: &Self) -> Result<Self, SurfaceError> {
-        let slope = f64::midpoint(self.cone.slope(), to.cone.slope());
-        let level = f64::midpoint(self.level, to.level);
-        Ok(Self { cone: Cone::from_slope(slope)?, level })
-    }
-
-    /// Returns how far this side lies below the point `at` of a layer, along the normal of that, mm.
-    #[must_use]
-    pub fn depth(&self, surface: &dyn LayerSurface, at: &Point3<f64>) -> f64 {
-        (at.z - self.cone.height(self.level, at.x.hypot(at.y))) * surface.slope_cos(at)
-    }
-}
-
-/// One layer of a [`blend`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BlendLayer {
-    /// Height of its upper side on the axis above the base, mm.
-    pub level: f64,
-    /// Its cone.
-    pub cone: Cone,
-}
-
-/// Returns the layers that lead from a plane to the cone of `slope` in the fewest steps, over a
-/// part that reaches `radius` mm from the axis, with layers between `thinnest` and `thickest` mm
-/// thick everywhere.
-///
-/// A layer is thickest on the axis when cones slope down outwards, at the rim when they are bowls.
-/// About `radius·asinh(|slope|)/(thickest − thinnest)` layers are needed.
-///
-/// # Errors
-///
-/// [`SurfaceError::NotFinite`] unless `0 < thinnest < thickest`, and radius and slope are numbers.
-pub fn blend(
-    slope: f64,
-    radius: f64,
-    [thinnest, thickest]: [f64; 2],
-) -> Result<Vec<BlendLayer>, SurfaceError> {
-    let is_sound = 0.0 < thinnest && thinnest < thickest && thickest.is_finite();
-    if !(is_sound && slope.is_finite() && radius.is_finite() && radius > 0.0) {
-        return Err(SurfaceError::NotFinite);
-    }
-    let mut layers = Vec::new();
-    let (mut steepness, mut level): (f64, f64) = (0.0, 0.0);
-    while steepness < slope.abs() {
-        // Thickness is (step of level − step of slope · r)·cos; the cosine is that of the new
-        // layer, which the step itself depends on: the flatter one before is a fraction off, so
-        // the step is found twice.
-        let mut next = steepness;
-        for _ in 0..2 {
-            next = steepness + (thickest - thinnest) / radius * next.hypot(1.0);
-        }
-        steepness = next.min(slope.abs());
-        let on_axis = if slope > 0.0 { thickest } else { thinnest };
-        level += on_axis * steepness.hypot(1.0);
-        let cone = Cone::from_slope(steepness.copysign(slope))?;
-        layers.push(BlendLayer { level, cone });
-    }
-    Ok(layers)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::{Caps, Spheres};
+    use crate::surface::{Caps, Cone, Spheres};
 
     #[test]
     fn the_layer_on_a_stair_takes_what_curved_layers_leave() {

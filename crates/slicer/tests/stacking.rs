@@ -3,11 +3,12 @@
 use mesh::topology::Solid;
 use nalgebra::{Point2, Point3, Vector3};
 use serde_json::Value;
+use slicer::blend::{Aim, Side, fewest};
 use slicer::chart::carried_point;
 use slicer::clearance::{LayerOrder, NozzleProfile, Uphill};
 use slicer::overhang::{overhang, steepest_overhang, unsupported};
 use slicer::section::{Cutter, level_range};
-use slicer::stacking::{WedgeRule, blend, depth};
+use slicer::stacking::{WedgeRule, depth};
 use slicer::surface::{Cone, LayerSurface, Plane, Spheres};
 
 /// The vectors, from a `shared/vectors` folder beside the repository; `None` in a plain clone.
@@ -160,23 +161,17 @@ fn blends_take_the_published_number_of_layers() {
         let slope = number(case, "sg") * number(case, "alpha_deg").to_radians().tan();
         let (radius, limits) =
             (number(case, "r_max"), [number(case, "hmin"), number(case, "hmax")]);
-        let layers = blend(slope, radius, limits).expect("sound");
+        let layers = fewest(&Aim::Cone { slope }, 0.0, radius, limits).expect("sound");
         near(layers.len() as f64, number(case, "n_layers"), 1.01, case);
-        let (mut below, mut slope_below) = (0.0, 0.0);
+        let mut below = Side::plane(0.0).expect("a plane");
         for layer in &layers {
-            for share in [0.0, 0.5, 1.0] {
-                let r = share * radius;
-                let rise = layer.level - below - (layer.cone.slope() - slope_below) * r;
-                let thickness = rise * layer.cone.angle().cos();
-                assert!(thickness > limits[0] - 1e-4 && thickness < limits[1] + 1e-4, "{case}");
-            }
-            (below, slope_below) = (layer.level, layer.cone.slope());
+            let [thin, thick] = below.thickness_to(layer, radius);
+            assert!(thin > limits[0] - 1e-4 && thick < limits[1] + 1e-4, "{case}");
+            below = *layer;
         }
-        near(slope_below, slope, 1e-12, case);
-        near(below, number(case, "height_centre"), 0.35, case);
+        near((below.level - below.height(radius)) / radius, slope, 1e-12, case);
+        near(below.level, number(case, "height_centre"), 0.35, case);
     }
-    assert!(blend(0.5, 10.0, [0.3, 0.1]).is_err());
-    assert!(blend(f64::NAN, 10.0, [0.1, 0.3]).is_err());
 }
 
 #[test]

@@ -18,7 +18,7 @@
 //! source's own search, for comparison.
 //!
 //! The sensor does not sit exactly where the nozzle does. [`pins`] finds the nozzle's own centre from
-//! a print.
+//! a print. [`pivot`] finds the pivot of a head that tilts, from touches of one point.
 //!
 //! Frames, signs and the model are those of [`kinematics`](crate::kinematics). Lengths are mm,
 //! angles radians. The source's own procedure, averages of the positions of a ring seen from one
@@ -32,6 +32,7 @@ pub mod log;
 pub mod pairing;
 pub mod peaks;
 pub mod pins;
+pub mod pivot;
 pub mod rig;
 pub mod ring;
 pub mod scan;

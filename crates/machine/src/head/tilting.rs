@@ -157,7 +157,7 @@ fn head(tilts: [f64; 2]) -> [f64; HEAD_AXES] {
     all
 }
 
-fn tilted(across: f64, along: f64) -> Rotation3<f64> {
+pub(crate) fn tilted(across: f64, along: f64) -> Rotation3<f64> {
     let about = |axis: UnitVector3<f64>, angle: f64| Rotation3::from_axis_angle(&axis, angle);
     about(Vector3::y_axis(), along) * about(Vector3::x_axis(), across)
 }

@@ -15,6 +15,8 @@ pub enum Calibrate {
     Scan(Box<CalibrateScan>),
     /// Write the pins to print, or find the nozzle's own centre from their distances
     Pins(CalibratePins),
+    /// Find the pivot of a head that tilts the nozzle, from touches of one point
+    Pivot(CalibratePivot),
     /// Explain a calibration file, and draw what printing without it would miss
     Show(CalibrateShow),
 }
@@ -123,6 +125,35 @@ pub struct CalibratePins {
     /// Standard deviation of one reading of the caliper, mm
     #[arg(long, value_name = "MM", default_value_t = 0.03)]
     pub caliper_sd: f64,
+}
+
+/// Arguments of `calibrate pivot`.
+#[derive(Debug, Args)]
+pub struct CalibratePivot {
+    /// The words at which the tip touched a fixed point, tilted now one way and now another, CSV:
+    /// s_mm,theta_deg,z_mm,a_deg,b_deg, or without a_deg where there is one tilt; `-` reads standard input
+    #[arg(required_unless_present = "simulate")]
+    pub log: Option<PathBuf>,
+    /// Where the calibration goes [default: LOG.toml], or the simulated log [default: pivot.csv]; `-`
+    /// writes standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Standard deviation of one touch in each coordinate, mm
+    #[arg(long, value_name = "MM", default_value_t = 0.01)]
+    pub touch_sd: f64,
+    /// Write the log of a simulated machine instead: its true length from pivot to tip, and how far the
+    /// tip lies beside the line down from the pivot, mm
+    #[arg(long, value_name = "LENGTH[,X,Y]", conflicts_with = "log", allow_hyphen_values = true)]
+    pub simulate: Option<String>,
+    /// How far the simulated machine tilts, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 30.0, requires = "simulate")]
+    pub tilt: f64,
+    /// Chooses the errors of the simulated touches
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "simulate")]
+    pub seed: u64,
+    /// Which settings to use
+    #[command(flatten)]
+    pub settings: SettingsArguments,
 }
 
 /// Arguments of `calibrate show`.

@@ -3,6 +3,7 @@
 mod file;
 mod fit;
 mod pins;
+mod pivot;
 mod scan;
 mod serial;
 mod show;
@@ -21,6 +22,7 @@ pub(super) fn run(calibrate: &Calibrate, manner: &Manner) -> Result<u8, Failure>
         Calibrate::Fit(arguments) => fit::run(arguments, manner),
         Calibrate::Scan(arguments) => scan::run(arguments, manner),
         Calibrate::Pins(arguments) => pins::run(arguments, manner),
+        Calibrate::Pivot(arguments) => pivot::run(arguments, manner),
         Calibrate::Show(arguments) => show::run(arguments, manner),
     }
 }

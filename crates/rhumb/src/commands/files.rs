@@ -75,6 +75,7 @@ impl Files {
                 .writes(a.output.iter().chain(&a.log).chain(&a.picture)),
             // Its calibration may be brought up to date in place.
             Calibrate::Pins(a) => self.reads(&a.readings).writes(&a.output),
+            Calibrate::Pivot(a) => self.reads(&a.log).writes(&a.output),
             Calibrate::Show(a) => self.reads([&a.file]).writes(&a.picture),
         }
     }

@@ -9,6 +9,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::key::{Key, Kind, Section, Value};
+use super::ranges;
 use crate::failure::Failure;
 
 /// What a file says.
@@ -73,6 +74,7 @@ pub fn from_text(key: &'static Key, text: &str, place: &str) -> Result<Value, Fa
             _ => Err(wrong()),
         },
         Kind::Choice(words) => choice(key, words, text.trim(), place),
+        Kind::Layers(words) => layers(key, words, text.trim(), place),
         Kind::Text => Ok(Value::Text(text.to_owned())),
     }
 }
@@ -119,8 +121,20 @@ fn typed(key: &'static Key, value: &DeValue<'_>, place: &str) -> Result<Value, F
         }
         (Kind::Switch, DeValue::Boolean(switch)) => Ok(Value::Switch(*switch)),
         (Kind::Choice(words), DeValue::String(text)) => choice(key, words, text, place),
+        (Kind::Layers(words), DeValue::String(text)) => layers(key, words, text, place),
         (Kind::Text, DeValue::String(text)) => Ok(Value::Text(text.to_string())),
         _ => Err(wrong()),
+    }
+}
+
+/// A word for all layers, or ranges of heights.
+fn layers(key: &'static Key, words: &[&str], text: &str, place: &str) -> Result<Value, Failure> {
+    if !ranges::is_ranges(text) {
+        return choice(key, words, text, place);
+    }
+    match ranges::parse(text) {
+        Ok(_) => Ok(Value::Text(text.to_owned())),
+        Err(wrong) => Err(Failure::new("ConfigRange", format!("{place}: {} = {wrong}", key.name))),
     }
 }
 

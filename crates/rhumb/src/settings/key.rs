@@ -49,6 +49,8 @@ pub enum Kind {
     Switch,
     /// One of these words.
     Choice(&'static [&'static str]),
+    /// One of these words for all layers, or ranges of heights with a word each.
+    Layers(&'static [&'static str]),
     /// Any text.
     Text,
 }
@@ -66,6 +68,10 @@ impl Kind {
             ),
             Self::Switch => "true or false".into(),
             Self::Choice(words) => format!("one of {}", words.join(", ")),
+            Self::Layers(words) => format!(
+                "one of {}, or ranges of heights such as planar:0-8,blend:8-14,conical:14-",
+                words.join(", ")
+            ),
             Self::Text => "a text".into(),
         }
     }
@@ -265,7 +271,9 @@ mod tests {
                 }
                 (Kind::Count(low, high), Default::Count(n)) => low <= n && n <= high,
                 (Kind::Switch, Default::Switch(_)) | (Kind::Text, Default::Text(_)) => true,
-                (Kind::Choice(words), Default::Text(word)) => words.contains(&word),
+                (Kind::Choice(words) | Kind::Layers(words), Default::Text(word)) => {
+                    words.contains(&word)
+                }
                 _ => false,
             };
             assert!(fits, "{}", key.name);

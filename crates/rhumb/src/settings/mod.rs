@@ -13,7 +13,9 @@ pub mod key;
 pub mod merge;
 pub mod page;
 pub mod prusa;
+pub mod ranges;
 pub mod resolve;
+mod surface;
 pub mod template;
 
 pub use key::{KEYS, Key, Kind, Section, Value};

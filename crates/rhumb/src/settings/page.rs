@@ -91,6 +91,7 @@ fn range(key: &Key) -> String {
         Kind::Count(least, greatest) => format!("{least} … {greatest}"),
         Kind::Switch => "true, false".into(),
         Kind::Choice(words) => words.join(", "),
+        Kind::Layers(words) => format!("{}, or ranges", words.join(", ")),
         Kind::Text => "text".into(),
     }
 }

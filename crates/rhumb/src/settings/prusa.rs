@@ -160,7 +160,7 @@ fn value(
         // Fans run at so many per cent, without a sign for it.
         Kind::Share(..) if written.ends_with("fan_speed") => told(&format!("{}%", first(raw))),
         Kind::Share(..) | Kind::Switch => told(first(raw)),
-        Kind::Choice(_) => told(raw),
+        Kind::Choice(_) | Kind::Layers(_) => told(raw),
         Kind::Text => {
             let text = raw.split(';').next().unwrap_or_default();
             told(text.trim_matches('"'))

@@ -38,8 +38,9 @@ use twin::motor::lag::BedDrive;
 use super::head;
 use super::key::{Key, Value};
 use super::merge::Settings;
-use super::template;
+use super::{surface, template};
 use crate::failure::Failure;
+use crate::ranges::Span;
 use crate::stages::LayerKind;
 
 /// Everything that a slice needs to know, checked.
@@ -55,8 +56,10 @@ pub struct Job {
     pub flats: FlatParams,
     /// Flat faces smaller than this need not be met, mm².
     pub least_flat_mm2: f64,
-    /// The surface that layers follow.
+    /// The surface that layers follow; of ranges the first that is curved.
     pub layers: LayerKind,
+    /// The ranges of heights whose layers are given; empty where one surface serves all.
+    pub spans: Vec<Span>,
     /// Whether the surface is chosen for each part.
     pub choose_layers: bool,
     /// Whether a cone too steep for the nozzle is lowered.
@@ -65,7 +68,7 @@ pub struct Job {
     pub nozzle: NozzleProfile,
     /// Planar layers under curved ones.
     pub base_layers: usize,
-    /// Whether conical layers grow out of the planar ones.
+    /// Whether curved layers grow out of the planar ones.
     pub morph: bool,
     /// Whether planar layers finish the flat top of a part in curved ones.
     pub planar_top: bool,
@@ -108,6 +111,7 @@ impl Job {
         let mut job = self.clone();
         let curved = kind != LayerKind::Planar;
         (job.layers, job.choose_layers, job.lower_cone) = (kind, false, false);
+        job.spans = Vec::new();
         (job.plan.curved, job.plan.order.uphill) = (curved, curved);
         job
     }
@@ -128,7 +132,7 @@ impl Job {
             .map_err(|error| Failure::new("ConfigConflict", error.to_string()))?;
         check_printer(&printer)?;
         check_layers(&get)?;
-        check_surface(&get)?;
+        surface::check(&get)?;
         Ok(Self {
             orient: OrientParams {
                 class_tolerance_rad: get.number("flat_angle_deg").to_radians(),
@@ -139,11 +143,12 @@ impl Job {
                 depth_mm: get.number("flat_depth_mm"),
             },
             least_flat_mm2: get.number("flat_area_min_mm2"),
-            layers: layers(&get),
+            layers: surface::layers(&get),
+            spans: surface::spans(&get),
             choose_layers: get.text("layers") == "auto",
             lower_cone: get.switch("cone_angle_max"),
             nozzle: nozzle(&get),
-            base_layers: base_layers(&get),
+            base_layers: surface::base_layers(&get),
             morph: get.text("blend") == "morph",
             planar_top: get.text("top") == "planar",
             schedule: schedule(&get)?,
@@ -178,27 +183,7 @@ fn labels(get: &Lookup<'_>, dialect: &Dialect) -> Option<LabelWords> {
     }
 }
 
-fn layers(get: &Lookup<'_>) -> LayerKind {
-    match get.text("layers") {
-        "conical" => LayerKind::Conical(get.number("cone_angle_deg").to_radians()),
-        "spherical" => LayerKind::Spherical(get.number("sphere_centre_mm")),
-        "caps" => LayerKind::Caps(get.number("cap_radius_mm")),
-        _ => LayerKind::Planar,
-    }
-}
-
-/// Planar layers under curved ones: so many, and all that end below where curved ones are to begin.
-fn base_layers(get: &Lookup<'_>) -> usize {
-    // Heights are sums of decimals.
-    const NOISE: f64 = 1e-6;
-    let above_first = get.number("curved_from_mm") - get.number("first_layer_height_mm");
-    let height = get.number("layer_height_mm");
-    let below =
-        if above_first > -NOISE { 1.0 + (above_first / height + NOISE).floor() } else { 0.0 };
-    get.count("base_layers").max(below as usize)
-}
-
-fn conflict(what: &str, value: &str) -> Failure {
+pub(super) fn conflict(what: &str, value: &str) -> Failure {
     Failure::new("ConfigConflict", format!("{what}: {value:?}"))
 }
 
@@ -366,27 +351,6 @@ fn check_layers(get: &Lookup<'_>) -> Result<(), Failure> {
         ));
     }
     Ok(())
-}
-
-/// What goes with cones alone; and turns of a vase go over into each other where layers are alike.
-fn check_surface(get: &Lookup<'_>) -> Result<(), Failure> {
-    let kind = get.text("layers");
-    if get.text("blend") == "morph" && ["spherical", "caps"].contains(&kind) {
-        return Err(conflict("blend = morph is for conical layers", kind));
-    }
-    if !get.switch("spiral_vase") {
-        return Ok(());
-    }
-    if get.switch("support_material") {
-        return Err(conflict("spiral_vase has no supports", "support_material = true"));
-    }
-    if kind == "conical" && get.text("blend") == "morph" {
-        return Err(conflict("spiral_vase climbs on layers that are all alike", "blend = morph"));
-    }
-    if ["planar", "conical", "caps"].contains(&kind) {
-        return Ok(());
-    }
-    Err(conflict("spiral_vase climbs on layers that are all alike (planar, conical, caps)", kind))
 }
 
 const WIDTHS: [&str; 5] = [
@@ -600,7 +564,7 @@ fn start(get: &Lookup<'_>, dialect: &Dialect, settings: &Settings) -> Result<Vec
 const COMB_SHARE: f64 = 0.4;
 
 fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanParams {
-    let curved = layers(get) != LayerKind::Planar;
+    let curved = surface::layers(get) != LayerKind::Planar;
     let diameter = get.number("filament_diameter_mm");
     PlanParams {
         order: OrderParams {
@@ -748,14 +712,14 @@ impl Lookup<'_> {
         }
     }
 
-    fn count(&self, name: &str) -> usize {
+    pub(super) fn count(&self, name: &str) -> usize {
         match self.value(name) {
             Value::Count(count) => usize::try_from(*count).expect("counts are not negative"),
             other => unreachable!("{name} is a count, not {other}"),
         }
     }
 
-    fn switch(&self, name: &str) -> bool {
+    pub(super) fn switch(&self, name: &str) -> bool {
         match self.value(name) {
             Value::Switch(switch) => *switch,
             other => unreachable!("{name} is a switch, not {other}"),
@@ -801,7 +765,13 @@ mod tests {
         assert_eq!(class(&["z_increment_mm=0.35"]), "ConfigConflict");
         assert!(resolve(&["z_increment_mm=0.35", "snap=off"]).is_ok());
         assert_eq!(class(&["spiral_vase=true", "layers=conical", "blend=morph"]), "ConfigConflict");
-        assert_eq!(class(&["layers=spherical", "blend=morph"]), "ConfigConflict");
+        for other in ["spiral_vase=true", "blend=morph", "curved_from_mm=3", "top=planar"] {
+            assert_eq!(
+                class(&["layers=planar:0-8,conical:8-", other]),
+                "ConfigConflict",
+                "{other}"
+            );
+        }
         assert_eq!(class(&["start_gcode=M109 S{no}"]), "ConfigUnknownKey");
         assert!(resolve(&["fill_density=100%"]).unwrap().paths.skins.all_solid);
     }

@@ -5,7 +5,8 @@ use geom::polyline::{distance_to_segment, share_nearest};
 use geom::region::{Fill, Region, Ring, ring_sides};
 use nalgebra::Point2;
 
-use crate::surface::{Cone, LayerSurface};
+use super::Chart;
+use crate::surface::LayerSurface;
 
 /// How far the image of a straight side may lie from its chords, mm: layers that are compared are
 /// known to about as much.
@@ -34,23 +35,22 @@ pub fn carried(surface: &dyn LayerSurface, region: &Region, from: f64, to: f64) 
     image_of(region, |p| carried_point(surface, p, from, to))
 }
 
-/// Returns what the normals through a region of a cone cover on another, steeper or flatter one, both
-/// in the charts of their cones. `distance` is how far the normals lead at a distance from the axis,
-/// mm.
+/// Returns what the normals of a layer cover of it that lead to a region of another, flatter or steeper
+/// one, both in the charts of their layers. `outwards` is how far the normals lead from the axis, by the
+/// distance that they begin at, mm.
 #[must_use]
-pub fn carried_to_cone(
+pub fn carried_to_side(
     region: &Region,
-    [from, to]: [&Cone; 2],
-    distance: impl Fn(f64) -> f64,
+    [from, to]: [&Chart; 2],
+    outwards: impl Fn(f64) -> f64,
 ) -> Region {
-    let (from_cos, to_cos, sin) = (from.angle().cos(), to.angle().cos(), to.angle().sin());
     image_of(region, |p| {
         let s = p.coords.norm();
         if s == 0.0 {
             return *p;
         }
-        let r = s * from_cos;
-        p * ((r + distance(r) * sin).max(0.0) / to_cos / s)
+        let r = from.radius(s);
+        p * (to.meridian((r + outwards(r)).max(0.0)) / s)
     })
 }
 

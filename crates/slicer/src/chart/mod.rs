@@ -11,7 +11,7 @@
 mod carry;
 mod offset;
 
-pub use carry::{carried, carried_point, carried_to_cone};
+pub use carry::{carried, carried_point, carried_to_side};
 
 use geom::grid::mm;
 use geom::region::{Region, Ring, ring_sides, signed_area};

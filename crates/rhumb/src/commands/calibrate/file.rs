@@ -16,6 +16,46 @@ pub(super) struct Draft {
 }
 
 impl Draft {
+    /// Returns what is known of a machine already.
+    pub(super) fn kept(before: &Calibration) -> Self {
+        let mut draft = Self::default();
+        let (rail, column, plate, bed) = (&before.rail, &before.column, &before.plate, &before.bed);
+        for (table, key, value) in [
+            ("rail", "a_mm", rail.a_mm),
+            ("rail", "b_mm", rail.b_mm),
+            ("column", "a1", column.a1),
+            ("column", "b1", column.b1),
+            ("plate", "ex_mm", plate.ex_mm),
+            ("plate", "ey_mm", plate.ey_mm),
+            ("plate", "psi_deg", plate.psi_deg),
+            ("bed", "theta_zero_deg", bed.theta_zero_deg),
+            ("bed", "backlash_deg", bed.backlash_deg),
+        ] {
+            draft.number(table, key, Some(value).filter(|value| *value != 0.0));
+        }
+        if let Some(shift) = plate.shift_mm {
+            draft.pair("plate", "shift_mm", shift);
+        }
+        if !bed.probes.is_empty() {
+            draft.triples("bed", "probes", &bed.probes);
+        }
+        for (key, value) in &before.quality {
+            // What was said of an earlier pivot is said anew.
+            if !key.starts_with("pivot_") {
+                draft.line("quality", key, &value.to_string());
+            }
+        }
+        draft
+    }
+
+    /// Adds the pivot of an earlier calibration.
+    pub(super) fn keep_head(&mut self, before: &Calibration) {
+        self.number("head", "pivot_length_mm", before.head.pivot_length_mm);
+        if let Some(offset) = before.head.offset_mm {
+            self.pair("head", "offset_mm", offset);
+        }
+    }
+
     /// Adds a number, where there is one.
     pub(super) fn number(&mut self, table: &'static str, key: &str, value: Option<f64>) {
         if let Some(value) = value.filter(|value| value.is_finite()) {

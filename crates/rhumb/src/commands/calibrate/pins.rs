@@ -147,6 +147,7 @@ fn draft(before: &Calibration, printed: &Printed, has_sensor: bool, n_readings: 
     if !bed.probes.is_empty() {
         draft.triples("bed", "probes", &bed.probes);
     }
+    draft.keep_head(before);
     draft.number("quality", "a_sd_mm", Some(printed.a.sd));
     draft.number("quality", "b_sd_mm", Some(printed.b.sd));
     draft.number("quality", "shrinkage", Some(printed.shrinkage.value));

@@ -6,7 +6,7 @@ use twin::picture::error_map::{draw, errors};
 
 use super::calibration;
 use crate::args::{CalibrateShow, Manner};
-use crate::calibration::Calibration;
+use crate::calibration::{Calibration, HeadTable};
 use crate::commands::{DONE, say, say_json, write_file};
 use crate::failure::Failure;
 use crate::settings::{Job, Settings};
@@ -24,7 +24,8 @@ pub(super) fn run(arguments: &CalibrateShow, manner: &Manner) -> Result<u8, Fail
     }
     let found = calibration(&arguments.file)?;
     let mut printer = Job::resolve(&Settings::defaults())?.printer;
-    found.apply(&mut printer, 0.0)?;
+    // The map is that of an upright nozzle, which no pivot moves.
+    Calibration { head: HeadTable::default(), ..found.clone() }.apply(&mut printer, 0.0)?;
     let all = errors(&printer.alignment, arguments.radius);
     // A plate that lies off the axis moves the whole print and bends nothing.
     let bent = Alignment { plate_offset: Vector2::zeros(), plate_angle: 0.0, ..printer.alignment };
@@ -124,6 +125,19 @@ fn explained(found: &Calibration) -> String {
             "bed.backlash_deg = {}: play of the drive, {:.3} mm at 100 mm from the axis",
             found.bed.backlash_deg,
             100.0 * found.bed.backlash_deg.to_radians()
+        ));
+    }
+    if let Some(length) = found.head.pivot_length_mm {
+        lines.push(format!(
+            "head.pivot_length_mm = {length}{}: from the pivot that the nozzle is tilted about to its \
+             tip",
+            sd("pivot_length_sd_mm")
+        ));
+    }
+    if let Some([along, across]) = found.head.offset_mm {
+        lines.push(format!(
+            "head.offset_mm = [{along}, {across}]: the tip beside the line down from the pivot, along \
+             the rail and across it"
         ));
     }
     if !found.bed.probes.is_empty() {

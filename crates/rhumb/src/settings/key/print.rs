@@ -25,13 +25,18 @@ const TOP_PATTERNS: &[&str] =
 
 /// In the order in which they are shown.
 pub(super) const KEYS: &[Key] = &[
-    choice(
-        Print,
-        "layers",
-        &["planar", "conical", "spherical", "caps", "auto"],
-        "the surface that layers follow: planes, cones about the axis, spheres about a point of it, \
-         or the same cap of a sphere lifted; auto weighs the first three for the part",
-    ),
+    Key {
+        name: "layers",
+        section: Print,
+        kind: Kind::Layers(&["planar", "conical", "spherical", "caps", "auto"]),
+        default: Default::Text("planar"),
+        program_name: "layers",
+        meaning: "the surface that layers follow: planes, cones about the axis, spheres about a point \
+                  of it, or the same cap of a sphere lifted; auto weighs the first three for the part; or \
+                  ranges of heights in mm with layers of their own, such as \
+                  planar:0-8,blend:8-14,conical:14-, where a blend leads from planes to curved layers or \
+                  back",
+    },
     number(
         Print,
         "cone_angle_deg",
@@ -82,7 +87,7 @@ pub(super) const KEYS: &[Key] = &[
         Print,
         "blend",
         &["none", "morph"],
-        "whether conical layers begin as wedges on the planar ones, or grow out of them, each a little \
+        "whether curved layers begin as wedges on the planar ones, or grow out of them, each a little \
          steeper and half to one and a half layers thick",
     ),
     choice(
