@@ -253,6 +253,31 @@ fn layers_are_chosen_by_what_hangs_over() {
 }
 
 #[test]
+fn a_lens_on_a_base_gets_layers_about_the_centre_of_its_face() {
+    // A face of 30 mm radius on a cylinder 4 mm high.
+    let arc = |k: u32| {
+        let r = 12.0 * f64::from(k) / 24.0;
+        [r, 4.0 + (900.0 - r * r).sqrt() - 756.0_f64.sqrt()]
+    };
+    let mut outline = vec![[0.0, 0.0], [12.0, 0.0]];
+    outline.extend((0..=24).rev().map(arc));
+    let report = weighed(&mesh::shapes::revolved(&outline, 96));
+    let weighed = &report["layers"]["weighed"];
+    let chosen = weighed["chosen"].as_str().unwrap();
+    assert!(chosen.contains("spherical, centre -23.49"), "{weighed}");
+    assert!(weighed["why"].as_str().unwrap().contains("steps"), "{weighed}");
+    let all = weighed["candidates"].as_array().unwrap();
+    let mixed = |c: &&serde_json::Value| {
+        c["surface"].as_str().unwrap().starts_with("planar up to 4 mm, then spherical")
+    };
+    let mixed = all.iter().find(mixed).expect("a planar base is tried");
+    assert!(mixed["steps"].as_f64().unwrap() < all[0]["steps"].as_f64().unwrap());
+    let least = all.iter().map(|c| c["cost"].as_f64().unwrap()).fold(f64::MAX, f64::min);
+    let of = |name: &str| all.iter().find(|c| c["surface"] == name).unwrap()["cost"].as_f64();
+    assert_eq!(of(chosen), Some(least), "{weighed}");
+}
+
+#[test]
 fn a_vase_is_one_line_that_climbs() {
     for layers in [&["--layers", "planar"][..], &["--layers", "conical", "--cone-angle=-15"]] {
         let mut arguments = vec!["--set", "spiral_vase=true", "--set", "skirts=0"];

@@ -143,7 +143,7 @@ pub fn slice_all(
     let turned = Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), -placed.azimuth);
     let upright = placed.solid.moved(|p| turned * p);
     let choice = weighed(&upright, &placed, job, watch)?;
-    let chosen = choice.as_ref().map(|choice| job.with_layers(choice.best().kind));
+    let chosen = choice.as_ref().map(|choice| choice.best().job(job));
     let job = chosen.as_ref().unwrap_or(job);
     let (stages, mut layout) = stages(&placed.solid, job)?;
     check_cuts(placed.solid.mesh(), stages.iter().map(|stage| stage.printed.len()).sum(), job)?;

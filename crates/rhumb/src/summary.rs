@@ -93,7 +93,7 @@ fn weighed_rows(choice: &Choice) -> Vec<(&'static str, String)> {
     let candidates = choice.candidates.iter().map(|candidate| {
         let text = format!(
             "{}: {} mm² unsupported, steps {} of a layer, {} min",
-            candidate.kind.describe(),
+            candidate.describe(),
             decimal(candidate.unsupported, 0),
             decimal(candidate.steps, 2),
             decimal(candidate.time / 60.0, 1)
@@ -107,7 +107,7 @@ fn weighed_rows(choice: &Choice) -> Vec<(&'static str, String)> {
 
 fn weighed(choice: &Choice) -> Weighed {
     let candidates = choice.candidates.iter().map(|candidate| WeighedSurface {
-        surface: candidate.kind.describe(),
+        surface: candidate.describe(),
         unsupported_mm2: tidy(candidate.unsupported),
         steps: tidy(candidate.steps),
         time_s: candidate.time,
@@ -115,7 +115,7 @@ fn weighed(choice: &Choice) -> Weighed {
     });
     Weighed {
         candidates: candidates.collect(),
-        chosen: choice.best().kind.describe(),
+        chosen: choice.best().describe(),
         steepest_deg: tidy(choice.steepest.to_degrees()),
         why: choice.why(),
     }
