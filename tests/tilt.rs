@@ -132,3 +132,21 @@ fn firmwares_that_turn_coordinates_themselves_are_no_match_for_a_tilt() {
     let joints = ["--set=head=hexapod", "--set=hexapod_layout=joints"];
     scratch.run(&[&slice[..], &joints].concat()).refused("ConfigConflict", 6);
 }
+
+#[test]
+fn programs_of_other_slicers_are_converted_for_heads_that_stay_upright() {
+    let scratch = Scratch::new();
+    scratch.cube("c.stl", 8.0);
+    let other = ["--dialect", "cartesian", "--set", "head=fixed", "--printer", "tilt-core-r-theta"];
+    let slice = ["slice", "c.stl", "-q", "-o", "c.gcode"];
+    scratch.run(&[&slice[..], &other[..]].concat()).expect(0);
+    for printer in MACHINES {
+        let ran = scratch.run(&["convert", "c.gcode", "-q", "-o", "p.gcode", "--printer", printer]);
+        if printer.starts_with("hexapod") {
+            ran.refused("ConfigConflict", 6);
+            continue;
+        }
+        ran.expect(0);
+        scratch.run(&["verify", "p.gcode", "-q", "--printer", printer]).expect(0);
+    }
+}

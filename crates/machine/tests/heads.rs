@@ -85,6 +85,9 @@ fn two_tilts_with_and_without_a_nozzle_beside_the_pivot() {
             .as_array()
             .map_or(Vector2::zeros(), |list| Vector2::from_fn(|k, _| list[k].as_f64().unwrap()));
         let head = Head::Tilting(Tilting { offset, ..Tilting::two_axes(length, ANY, ANY) });
+        // Published with the rail's alignment at the pivot; here it is that of the upright tip.
+        let [a, b] = [alignment.a + offset.x, alignment.b + offset.y];
+        let alignment = Alignment { a, b, ..alignment };
         let stance = head.stance(&pose, BedTurn::default(), &alignment).unwrap().stance;
         same(stance.base.s, number(case, "s"));
         same(stance.base.turn.radians(), number(case, "theta"));

@@ -90,7 +90,7 @@ pub struct HeadTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pivot_length_mm: Option<f64>,
     /// How far the tip lies beside the line down from the pivot, along and across the rail, mm; of heads
-    /// with two axes.
+    /// with two axes. Where an upright tip stands is told by `rail`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset_mm: Option<[f64; 2]>,
 }

@@ -269,6 +269,29 @@ fn a_pivot_is_found_from_touches_within_three_standard_errors() {
 }
 
 #[test]
+fn a_program_for_a_calibrated_pivot_proves_sound_on_that_machine_and_not_on_another() {
+    let folder = folder("pivot-print");
+    let head = "[head]\npivot_length_mm = 47.3\noffset_mm = [0.41, -0.6]\n";
+    std::fs::write(folder.join("cal.toml"), head).expect("written");
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/dome.stl");
+    let machine = ["--printer", "polar-two-axis"];
+    let spheres = ["--layers=spherical", "--sphere-centre=-12", "--set", "tilt=normal"];
+    let slice = ["slice", model.to_str().expect("a path"), "-q", "--scale=0.4", "-o", "o.gcode"];
+    let calibrated = ["--calibration", "cal.toml"];
+    let sliced = rhumb(&folder, &[&slice[..], &machine, &spheres, &calibrated].concat());
+    assert_eq!(sliced.status.code(), Some(0), "{}", text(&sliced.stderr));
+    let verify = ["verify", "o.gcode", "-q"];
+    // What hangs inside of it hangs on any machine.
+    let is_off = |said: &str| {
+        said.lines().any(|line| ["surface: ", "head: "].iter().any(|check| line.starts_with(check)))
+    };
+    let there = text(&rhumb(&folder, &[&verify[..], &machine, &calibrated].concat()).stdout);
+    assert!(!is_off(&there), "{there}");
+    let elsewhere = text(&rhumb(&folder, &[&verify[..], &machine].concat()).stdout);
+    assert!(is_off(&elsewhere), "{elsewhere}");
+}
+
+#[test]
 fn what_tells_no_pivot_is_refused() {
     let folder = folder("no-pivot");
     let run = |arguments: &[&str]| {

@@ -1,13 +1,14 @@
 //! The pivot of a head that tilts the nozzle, from touches of one fixed point.
 //!
 //! The tip touches a fixed point that turns with the bed (a pin, or a probe that switches) with the nozzle
-//! tilted now one way and now another. The words of each touch say where the pivot stood. With `L` from the
-//! pivot to the tip, `(ox, oy)` how far the tip lies beside the line down from the pivot, `R = Ry(B)·Rx(A)`
-//! and `Q` the point over the bed, every touch gives three equations that are linear in all six:
+//! tilted now one way and now another. The words of each touch say where an upright nozzle would have had
+//! its tip. With `L` from the pivot to the tip, `(ox, oy)` how far the tip lies beside the line down from the
+//! pivot, `R = Ry(B)·Rx(A)` and `Q` the point over the bed, every touch gives three equations that are
+//! linear in all six:
 //!
 //! ```text
-//! Rz(theta) · (nozzle(s, z) + [R·(ox, oy, −L)]xy) = Qxy
-//! z + L + [R·(ox, oy, −L)]z                       = Qz
+//! Rz(theta) · (nozzle(s, z) + [R·(ox, oy, −L)]xy − (ox, oy)) = Qxy
+//! z + L + [R·(ox, oy, −L)]z                                  = Qz
 //! ```
 //!
 //! The lift counts from where an upright nozzle touches the bed, so an upright touch alone says nothing of
@@ -167,12 +168,11 @@ pub fn fit(
     for (k, touch) in touches.iter().enumerate() {
         let turned = Rotation2::new(alignment.bed.azimuth(touch.base.turn));
         let tilted = tilted(touch.across, touch.along);
-        // What a millimetre of length and of offsets moves the tip by.
-        let moved = [-Vector3::z(), Vector3::x(), Vector3::y()].map(|way| tilted * way);
+        // What a millimetre of length and of offsets moves the tip by, beside that of an upright nozzle.
+        let moved = [-Vector3::z(), Vector3::x(), Vector3::y()].map(|way| tilted * way - way);
         for (column, way) in moved.iter().take(head_unknowns).enumerate() {
             let over_bed = turned * way.xy();
-            let up = way.z + if column == 0 { 1.0 } else { 0.0 };
-            for (row, value) in [over_bed.x, over_bed.y, up].into_iter().enumerate() {
+            for (row, value) in [over_bed.x, over_bed.y, way.z].into_iter().enumerate() {
                 lines[(3 * k + row, column)] = value;
             }
         }

@@ -22,7 +22,8 @@ use crate::program::{BedTurn, Joints};
 pub struct Tilting {
     /// From the pivot to the tip, mm.
     pub pivot_length: f64,
-    /// How far the tip lies from the line down from the pivot, with both tilts zero, mm.
+    /// How far the tip lies from the line down from the pivot, with both tilts zero, mm. Where it stands
+    /// then is told by the alignment of the rail, which is that of the upright nozzle.
     pub offset: Vector2<f64>,
     /// Its tilts: `B`, or `A` and `B`.
     pub axes: Vec<HeadAxis>,
@@ -121,10 +122,11 @@ impl Tilting {
         Err(Unreachable::Head { what: "tilt", value: 0.0, limit: 0.0, unit: "" })
     }
 
-    /// From the pivot to the tip, as the machine sees it.
+    /// From where an upright nozzle would have its tip, at the height of the pivot, to the tip, as the
+    /// machine sees it.
     fn to_tip(&self, across: f64, along: f64) -> Vector3<f64> {
-        let nozzle = Vector3::new(self.offset.x, self.offset.y, -self.pivot_length);
-        tilted(across, along) * nozzle
+        let beside = Vector3::new(self.offset.x, self.offset.y, 0.0);
+        tilted(across, along) * (beside - Vector3::z() * self.pivot_length) - beside
     }
 
     pub(super) fn pose(&self, stance: &Stance, alignment: &Alignment) -> Pose {

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Cursor, Write};
 use std::path::{Path, PathBuf};
 
+use machine::head::Head;
 use nalgebra::Vector2;
 use twin::verify::Verdict;
 
@@ -19,10 +20,11 @@ use crate::output::{self, Output};
 use crate::place::parse_centre;
 use crate::program_text::duration;
 use crate::report::SlowFlow;
+use crate::settings::Job;
 
 pub(super) fn run(arguments: &Convert, manner: &Manner) -> Result<u8, Failure> {
     let interrupt = Interrupt::on_signals();
-    let (_, job) = settings(&arguments.settings)?;
+    let job = upright(settings(&arguments.settings)?.1);
     let source = Source::open(&arguments.program)?;
     let name = display_name(&arguments.program);
     let origin = match arguments.origin.as_str() {
@@ -55,6 +57,13 @@ pub(super) fn run(arguments: &Convert, manner: &Manner) -> Result<u8, Failure> {
     tell(&converted, slow.as_ref(), verdict.as_ref(), (&origin, &target), manner)?;
     let is_clean = verdict.is_none_or(|verdict| verdict.findings.is_empty());
     Ok(if is_clean && converted.left_out == 0 { DONE } else { LOOK })
+}
+
+/// A head on the carriage keeps its nozzle upright: programs of others say nothing of tilts, and with all of
+/// them at zero its words are those of a printer without a head.
+fn upright(mut job: Job) -> Job {
+    job.printer.head = job.printer.head.filter(|head| !matches!(head, Head::Tilting(_)));
+    job
 }
 
 /// A program that can be read from its begin more than once.

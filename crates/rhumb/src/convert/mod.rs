@@ -101,9 +101,9 @@ pub fn convert(
     if job.printer.head.is_some() {
         return Err(Failure::new(
             "ConfigConflict",
-            "programs of other slicers are for upright nozzles, this printer's head turns its own",
+            "programs of other slicers are for a nozzle on a carriage, and this printer's is on legs",
         )
-        .hint("--set head=fixed, where the carriage can move the nozzle without its tilts"));
+        .hint("--set head=fixed, where a carriage can move the nozzle without its legs"));
     }
     let chord = job.plan.resample.chord;
     let mut batches = Batches::new(source, request, chord * ARC_SHARE);
