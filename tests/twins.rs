@@ -30,8 +30,11 @@ fn turned([a, b, c]: Facet) -> Facet {
     [a, c, b]
 }
 
+/// What is done to a model.
+type Damage = (&'static str, fn(&mut Vec<Facet>));
+
 /// Damage that files really have.
-const DAMAGES: [(&str, fn(&mut Vec<Facet>)); 10] = [
+const DAMAGES: [Damage; 10] = [
     ("a facet is missing", |all| {
         all.remove(all.len() / 3);
     }),

@@ -553,14 +553,7 @@ impl Printed {
             );
         }
         if let (count @ 1.., first) = self.gaps {
-            warn(
-                "EmptyLayers",
-                format!(
-                    "no bead fits into {count} of the layers, the first at z {first:.2} mm: what is \
-                     above begins in mid-air; turn the part (--orient), cut it (--cut), or print more \
-                     walls"
-                ),
-            );
+            warn("EmptyLayers", empty_layers(count, first));
         }
         if let Some((layer, Floating { at, area })) = self.floating.first() {
             let more = match self.floating.len() - 1 {
@@ -621,6 +614,13 @@ impl Printed {
         }
         warnings
     }
+}
+
+fn empty_layers(count: usize, first: f64) -> String {
+    format!(
+        "no bead fits into {count} of the layers, the first at z {first:.2} mm: what is above begins in \
+         mid-air; turn the part (--orient), cut it (--cut), or print more walls"
+    )
 }
 
 /// Lost places smaller than this are the sharp corners of every part, mm²: a quarter of a bead's
