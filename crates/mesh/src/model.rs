@@ -143,6 +143,25 @@ pub fn read(format: Format, bytes: &[u8]) -> Result<Given, ModelError> {
     Ok(given)
 }
 
+/// Settings of another slicer that a 3MF holds.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Embedded {
+    /// Those of PrusaSlicer and its like: a line `; key = value` for each.
+    Prusa(Vec<u8>),
+    /// Those of OrcaSlicer and its like: a JSON object.
+    Orca(Vec<u8>),
+}
+
+/// Returns the settings of another slicer that a 3MF holds; `None` where there are none, or the file is
+/// no such package.
+///
+/// # Errors
+///
+/// [`ModelError`] when they are there and cannot be unpacked.
+pub fn embedded_settings(bytes: &[u8]) -> Result<Option<Embedded>, ModelError> {
+    if bytes.starts_with(archive::SIGNATURE) { threemf::settings(bytes) } else { Ok(None) }
+}
+
 /// A facet of such corners, in single precision as everywhere before the weld.
 fn facet(corners: [[f64; 3]; 3], place: impl Fn() -> String) -> Result<Facet, ModelError> {
     let flat = corners.as_flattened();

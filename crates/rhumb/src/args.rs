@@ -725,7 +725,8 @@ pub enum Profile {
     },
     /// Take over print and filament settings of PrusaSlicer
     Import {
-        /// What PrusaSlicer exports as a configuration
+        /// What PrusaSlicer exports as a configuration, or a 3MF with settings of PrusaSlicer, OrcaSlicer or
+        /// Bambu Studio
         file: PathBuf,
         /// What the new profiles are called: NAME.print.toml and NAME.material.toml [default: as FILE]
         #[arg(short, long, value_name = "NAME")]

@@ -10,11 +10,12 @@ mod part;
 mod volumes;
 
 use super::archive::Archive;
-use super::{Given, ModelError, facet};
+use super::{Embedded, Given, ModelError, facet};
 use crate::note::{self, Note};
 use crate::soup::Soup;
 use part::{Component, Object, Part, Shape, Transform};
 use std::collections::BTreeMap;
+use std::io::Read;
 use volumes::LeftOut;
 
 /// Where the model of a package is, unless its relationships say otherwise.
@@ -44,6 +45,30 @@ pub(super) fn read(bytes: &[u8]) -> Result<Given, ModelError> {
     let notes = package.notes();
     Ok(Given { soup: placed.soup, objects: placed.objects, notes })
 }
+
+/// Where slicers keep the settings of a print.
+const SETTINGS: [&str; 3] = [
+    "Metadata/Slic3r_PE.config",
+    "Metadata/SuperSlicer.config",
+    "Metadata/project_settings.config",
+];
+
+/// The settings of another slicer.
+pub(super) fn settings(bytes: &[u8]) -> Result<Option<Embedded>, ModelError> {
+    let archive = Archive::of(bytes).map_err(malformed)?;
+    for name in SETTINGS {
+        let Some(member) = archive.open(name) else { continue };
+        let mut text = Vec::new();
+        let read = member.map_err(malformed)?.take(MOST_SETTINGS).read_to_end(&mut text);
+        read.map_err(|error| malformed(format!("{name}: {error}")))?;
+        let is_json = text.trim_ascii_start().starts_with(b"{");
+        return Ok(Some(if is_json { Embedded::Orca(text) } else { Embedded::Prusa(text) }));
+    }
+    Ok(None)
+}
+
+/// Settings are a few tens of kilobytes; more than this are none, bytes.
+const MOST_SETTINGS: u64 = 16 << 20;
 
 fn malformed(what: impl Into<String>) -> ModelError {
     ModelError::Malformed { format: "3MF", what: what.into() }
@@ -150,7 +175,7 @@ impl Package<'_> {
         };
         if self.archive.names().any(is_settings) {
             let what = "settings of another slicer in the file are not taken over: only the shapes \
-                        and their places are";
+                        and their places are (rhumb profile import makes profiles of them)";
             notes.push(Note::new(note::EMBEDDED_SETTINGS_IGNORED, what.to_owned()));
         }
         notes

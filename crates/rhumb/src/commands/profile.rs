@@ -3,11 +3,14 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use mesh::model::{self, Embedded};
+
 use super::{DONE, LOOK, display_name, say, say_json, write_file};
 use crate::args::{Manner, Profile, SettingsArguments};
 use crate::failure::Failure;
 use crate::input;
 use crate::settings::merge::BUILT_IN;
+use crate::settings::orca;
 use crate::settings::prusa::{self, Imported};
 use crate::settings::{Job, KEYS, Section, Settings, Sources};
 
@@ -23,7 +26,18 @@ pub(super) fn run(profile: &Profile, manner: &Manner) -> Result<u8, Failure> {
 /// Takes over settings of PrusaSlicer, and says which it could not.
 fn import(file: &Path, output: Option<&Path>, manner: &Manner) -> Result<u8, Failure> {
     let name = display_name(file);
-    let imported = prusa::read(&input::read(file)?, &name)?;
+    let bytes = input::read(file)?;
+    let embedded = model::embedded_settings(&bytes)
+        .map_err(|error| Failure::new(error.class(), error.to_string()).about(file))?;
+    let imported = match &embedded {
+        Some(Embedded::Prusa(text)) => prusa::read(&orca::uncommented(text), &name)?,
+        Some(Embedded::Orca(json)) => orca::read(json, &name)?,
+        None if bytes.starts_with(b"PK") => {
+            let what = format!("{name}: there are no settings of a slicer in it");
+            return Err(Failure::new("ConfigSyntax", what));
+        }
+        None => prusa::read(&bytes, &name)?,
+    };
     let stem = file.file_stem().filter(|_| file != Path::new("-")).unwrap_or("prusa".as_ref());
     let base = output.map_or_else(|| stem.to_owned(), |path| path.as_os_str().to_owned());
     let mut written = Vec::new();

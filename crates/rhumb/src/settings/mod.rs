@@ -11,6 +11,7 @@ pub mod file;
 mod head;
 pub mod key;
 pub mod merge;
+pub mod orca;
 pub mod page;
 pub mod prusa;
 pub mod ranges;
