@@ -93,9 +93,32 @@ fn model(name: &'static str, path: &Path, settings: &Settings, job: &Job) -> Opt
     Some(Model { name, bytes, solid, levels, sections, program, outcome })
 }
 
+/// The settings with every optional feature of print quality on.
+fn everything_on() -> Settings {
+    let mut settings = Settings::defaults();
+    for pair in [
+        "support_material=true",
+        "ironing=true",
+        "fuzzy_skin=true",
+        "scarf_seam_placement=everywhere",
+        "avoid_crossing_perimeters=true",
+        "extra_perimeters=true",
+        "only_one_perimeter_top=true",
+        "seam_position=corner",
+        "xy_size_compensation_mm=-0.05",
+        "elefant_foot_compensation_mm=0.1",
+        "fill_pattern=lightning",
+    ] {
+        settings.set(pair).unwrap();
+    }
+    settings
+}
+
 fn stages(criterion: &mut Criterion) {
     let settings = Settings::defaults();
     let job = Job::resolve(&settings).unwrap();
+    let everything = everything_on();
+    let all_on = Job::resolve(&everything).unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap();
     let models: Vec<Model> = [
         ("cube", root.join("models/cube.stl")),
@@ -124,6 +147,12 @@ fn stages(criterion: &mut Criterion) {
         group.bench_function(BenchmarkId::from_parameter("whole slice"), |bencher| {
             bencher.iter(|| whole(&model.bytes, &settings, &job).0.len());
         });
+        group.bench_function(
+            BenchmarkId::from_parameter("whole slice, everything on"),
+            |bencher| {
+                bencher.iter(|| whole(&model.bytes, &everything, &all_on).0.len());
+            },
+        );
         group.bench_function(BenchmarkId::from_parameter("verify"), |bencher| {
             let part = Some(part(&model.outcome));
             bencher.iter(|| {
