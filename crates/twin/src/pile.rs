@@ -309,8 +309,9 @@ impl Pile {
         let (rows, columns) = (count(down.xy().norm()), count(along.xy().norm()));
         for sign in [1.0, -1.0] {
             let edge = aside * (sign * piece.half_width);
-            // Only what leans outwards is seen from above.
-            if edge.xy().dot(&down.xy()) <= 0.0 {
+            // Only what leans outwards is seen from above; beyond the axis the layer falls again.
+            let beyond_axis = (from + edge).xy().coords.dot(&from.xy().coords) <= 0.0;
+            if edge.xy().dot(&down.xy()) <= 0.0 || beyond_axis {
                 continue;
             }
             for row in 1..=rows {

@@ -3,8 +3,9 @@
 //! Facets of zero area with three different corners stay: they join their neighbours, and
 //! without them the surface would be open there.
 //!
-//! Of facets with the same corners in the same direction, the first stays. Facets with the same
-//! corners in opposite directions lie back to back, and that means one of two things:
+//! Of facets with the same corners in the same direction, the first stays; two do where two solids
+//! inside each other have a side in common, facet for facet, and would else be open there. Facets with
+//! the same corners in opposite directions lie back to back, and that means one of two things:
 //!
 //! * a *double skin*, where an exporter wrote one surface with both faces. One of each two must
 //!   go, or the solid counts as nothing;
@@ -13,7 +14,7 @@
 //!
 //! Which one it is shows at the rim: a patch of such pairs is thinned to one face where that
 //! leaves fewer edges with an odd number of facets than keeping both does, or where it closes by
-//! itself. A double skin that is thinned has no direction of its own; its neighbours decide.
+//! itself; a patch of copies is, unless that leaves more. A double skin that is thinned has no direction of its own; its neighbours decide.
 
 use super::{Winding, Work};
 use crate::groups::Groups;
@@ -72,17 +73,22 @@ fn drop_same(work: &Work, edges: &Edges, keep: &mut [bool]) -> Vec<Pair> {
         })
         .collect();
     keys.sort_unstable();
-    let mut pairs = Vec::new();
+    let (mut copies, mut pairs) = (Vec::new(), Vec::new());
     for same_corners in keys.chunk_by(|a, b| a.0 == b.0) {
+        let first = same_corners[0];
+        let other = same_corners.iter().find(|key| key.1 != first.1);
         for same in same_corners.chunk_by(|a, b| a.1 == b.1) {
-            for (_, _, t) in &same[1..] {
-                keep[*t as usize] = false;
+            match same {
+                [(_, _, one), (_, _, two)] if other.is_none() => copies.push([*one, *two]),
+                _ => same[1..].iter().for_each(|(_, _, t)| keep[*t as usize] = false),
             }
         }
-        let first = same_corners[0];
-        if let Some(other) = same_corners.iter().find(|key| key.1 != first.1) {
+        if let Some(other) = other {
             pairs.push([first.2.min(other.2), first.2.max(other.2)]);
         }
+    }
+    for (copy, patch) in copies.iter().zip(patches(edges, &copies, keep)) {
+        keep[copy[1] as usize] = patch.odd_if_kept < patch.odd_if_thinned;
     }
     pairs
 }
@@ -109,7 +115,28 @@ struct Rim {
     n_others: usize,
 }
 
+/// A patch of pairs of facets that lie on each other.
+#[derive(Clone, Copy, Default)]
+struct Patch {
+    /// Edges with an odd number of facets if both facets of every pair stay, and if one does.
+    odd_if_kept: usize,
+    odd_if_thinned: usize,
+    /// Whether other facets meet it somewhere.
+    has_rim: bool,
+}
+
 fn thin_double_skins(work: &mut Work, edges: &Edges, pairs: &[Pair], keep: &mut [bool]) {
+    for (pair, patch) in pairs.iter().zip(patches(edges, pairs, keep)) {
+        let closes = !patch.has_rim && patch.odd_if_thinned == 0;
+        if patch.odd_if_thinned < patch.odd_if_kept || closes {
+            keep[pair[1] as usize] = false;
+            work.windings[pair[0] as usize] = Winding::Free;
+        }
+    }
+}
+
+/// The patch that each pair is part of.
+fn patches(edges: &Edges, pairs: &[Pair], keep: &[bool]) -> Vec<Patch> {
     let rims = rims(edges, pairs, keep);
     // Pairs that share an edge with nothing else there belong to one patch.
     let mut groups = Groups::new(pairs.len());
@@ -119,25 +146,18 @@ fn thin_double_skins(work: &mut Work, edges: &Edges, pairs: &[Pair], keep: &mut 
         }
     }
     let patch_of: Vec<usize> = (0..pairs.len()).map(|i| groups.leader(i)).collect();
-    let mut odd_if_kept = vec![0; pairs.len()];
-    let mut odd_if_thinned = vec![0; pairs.len()];
-    let mut alone = vec![true; pairs.len()];
+    let mut patches = vec![Patch::default(); pairs.len()];
     for rim in &rims {
-        let mut patches: Vec<usize> = rim.pairs.iter().map(|pair| patch_of[*pair]).collect();
-        patches.sort_unstable();
-        for patch in patches.chunk_by(|a, b| a == b) {
-            odd_if_kept[patch[0]] += rim.n_others % 2;
-            odd_if_thinned[patch[0]] += (rim.n_others + patch.len()) % 2;
-            alone[patch[0]] &= rim.n_others == 0;
+        let mut there: Vec<usize> = rim.pairs.iter().map(|pair| patch_of[*pair]).collect();
+        there.sort_unstable();
+        for run in there.chunk_by(|a, b| a == b) {
+            let patch = &mut patches[run[0]];
+            patch.odd_if_kept += rim.n_others % 2;
+            patch.odd_if_thinned += (rim.n_others + run.len()) % 2;
+            patch.has_rim |= rim.n_others > 0;
         }
     }
-    for (pair, &patch) in pairs.iter().zip(&patch_of) {
-        let closes = alone[patch] && odd_if_thinned[patch] == 0;
-        if odd_if_thinned[patch] < odd_if_kept[patch] || closes {
-            keep[pair[1] as usize] = false;
-            work.windings[pair[0] as usize] = Winding::Free;
-        }
-    }
+    patch_of.into_iter().map(|leader| patches[leader]).collect()
 }
 
 /// The edges of all pairs, each once.
@@ -200,6 +220,21 @@ mod tests {
         let rotated = |t: &[[u32; 3]]| t[4..8].iter().map(|t| [t[1], t[2], t[0]]).collect();
         assert_eq!(outcome(cube_and(rotated)), [4, 12, 0]);
         assert_eq!(outcome(cube_and(<[_]>::to_vec)), [12, 12, 0]);
+    }
+
+    #[test]
+    fn a_side_that_two_solids_share_stays_twice() {
+        // A lower block inside the cube, on the same two facets.
+        let mut mesh = shapes::cube(20.0);
+        let low: Vec<bool> = mesh.vertices.iter().map(|p| p.z < 10.0).collect();
+        let first = mesh.vertices.len() as u32;
+        let halfway =
+            mesh.vertices.clone().into_iter().map(|p| nalgebra::Point3::new(p.x, p.y, 10.0));
+        mesh.vertices.extend(halfway);
+        let own = |v: u32| if low[v as usize] { v } else { v + first };
+        let block: Vec<[u32; 3]> = mesh.triangles.iter().map(|t| t.map(own)).collect();
+        mesh.triangles.extend(block);
+        assert_eq!(outcome(mesh), [0, 24, 0]);
     }
 
     #[test]

@@ -492,9 +492,9 @@ mod tests {
     /// A number that a spool does not hold must not become as many moves; found by fuzzing.
     #[test]
     fn filament_without_measure_is_refused_or_fed_before_the_move() {
-        let mut reader = Reader::new(Vector2::zeros(), Point3::origin(), 0.01);
         for line in ["G1 E99999999999999", "G1 X5 E100000", "G1 X20 E1666666666666666666666666666"]
         {
+            let mut reader = Reader::new(Vector2::zeros(), Point3::origin(), 0.01);
             let mut strokes = Vec::new();
             let read = reader.line(line, &mut strokes).map(|_| ());
             assert!(strokes.len() < 10_000, "{line}");

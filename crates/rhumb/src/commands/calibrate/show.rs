@@ -54,13 +54,27 @@ pub(super) fn run(arguments: &CalibrateShow, manner: &Manner) -> Result<u8, Fail
 }
 
 fn explained(found: &Calibration) -> String {
-    let sd = |key: &str| {
-        found
-            .quality
-            .get(key)
-            .and_then(toml::Value::as_float)
-            .map_or_else(String::new, |sd| format!(" ± {sd:.4}"))
-    };
+    let mut lines = of_rail(found);
+    lines.extend(of_plate(found));
+    lines.extend(of_bed(found));
+    lines.extend(of_head(found));
+    if !found.bed.probes.is_empty() {
+        lines.push(format!("bed.probes: {} heights of the bed", found.bed.probes.len()));
+    }
+    for (key, value) in &found.quality {
+        lines.push(format!("quality.{key} = {value}"));
+    }
+    lines.join("\n") + "\n"
+}
+
+/// How sure a number is, with what stands before it.
+fn sd(found: &Calibration, key: &str) -> String {
+    let sd = found.quality.get(key).and_then(toml::Value::as_float);
+    sd.map_or_else(String::new, |sd| format!(" ± {sd:.4}"))
+}
+
+fn of_rail(found: &Calibration) -> Vec<String> {
+    let sd = |key| sd(found, key);
     let mut lines = Vec::new();
     let (a, b) = (found.rail.a_mm, found.rail.b_mm);
     let way = if a < 0.0 { "nearer to" } else { "farther from" };
@@ -94,13 +108,18 @@ fn explained(found: &Calibration) -> String {
             100.0 * b1
         ));
     }
+    lines
+}
+
+fn of_plate(found: &Calibration) -> Vec<String> {
+    let sd = |key| sd(found, key);
     let (ex, ey) = (found.plate.ex_mm, found.plate.ey_mm);
-    lines.push(format!(
+    let mut lines = vec![format!(
         "plate.ex_mm = {ex}{}, plate.ey_mm = {ey}{}: the plate's centre lies {:.3} mm off the axis",
         sd("ex_sd_mm"),
         sd("ey_sd_mm"),
         ex.hypot(ey)
-    ));
+    )];
     if found.plate.psi_deg != 0.0 {
         lines.push(format!(
             "plate.psi_deg = {}{}: the plate is turned so far on the bed",
@@ -114,6 +133,11 @@ fn explained(found: &Calibration) -> String {
              coordinate"
         ));
     }
+    lines
+}
+
+fn of_bed(found: &Calibration) -> Vec<String> {
+    let mut lines = Vec::new();
     if found.bed.theta_zero_deg != 0.0 {
         lines.push(format!(
             "bed.theta_zero_deg = {}: azimuth of the rail where the bed counts zero",
@@ -127,11 +151,16 @@ fn explained(found: &Calibration) -> String {
             100.0 * found.bed.backlash_deg.to_radians()
         ));
     }
+    lines
+}
+
+fn of_head(found: &Calibration) -> Vec<String> {
+    let mut lines = Vec::new();
     if let Some(length) = found.head.pivot_length_mm {
         lines.push(format!(
             "head.pivot_length_mm = {length}{}: from the pivot that the nozzle is tilted about to its \
              tip",
-            sd("pivot_length_sd_mm")
+            sd(found, "pivot_length_sd_mm")
         ));
     }
     if let Some([along, across]) = found.head.offset_mm {
@@ -140,11 +169,5 @@ fn explained(found: &Calibration) -> String {
              the rail and across it"
         ));
     }
-    if !found.bed.probes.is_empty() {
-        lines.push(format!("bed.probes: {} heights of the bed", found.bed.probes.len()));
-    }
-    for (key, value) in &found.quality {
-        lines.push(format!("quality.{key} = {value}"));
-    }
-    lines.join("\n") + "\n"
+    lines
 }
