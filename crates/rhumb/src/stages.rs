@@ -10,7 +10,7 @@
 //! With `blend = morph` curved layers do not begin as wedges: between base and them lie layers that are
 //! each a little steeper than the one below, as many as the limits of a layer's thickness ask for.
 //!
-//! What lies where may also be said by [ranges](crate::ranges) of heights.
+//! What lies where may also be said by ranges of heights ([`crate::ranges`]).
 //!
 //! A stage knows more levels than it prints: what lies beyond is cut all the same, because it
 //! decides where the printed ones are bottoms and tops. The base is part of the same solid, so its
