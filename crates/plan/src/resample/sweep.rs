@@ -62,23 +62,15 @@ mod tests {
     use machine::kinematics::BedScale;
     use machine::program::BedTurn;
 
-    const LEANING: Alignment = Alignment {
-        a: 0.2,
-        b: 0.35,
-        a1: 0.0015,
-        b1: -0.002,
-        plate_offset: Vector2::new(0.3, -0.4),
-        plate_angle: 0.05,
-        bed: BedScale { zero: 0.7, is_reversed: true, backlash: 0.0 },
-    };
-
     #[test]
     fn places_are_those_of_the_joints_between_and_headings_their_derivative() {
+        let bed = BedScale { zero: 0.7, is_reversed: true, backlash: 0.0 };
+        let leaning = Alignment { a: 0.2, b: 0.35, b1: -0.002, bed, ..Alignment::IDEAL };
         let from = Joints { s: 31.0, turn: BedTurn::accumulated(40.3), z: 2.0 };
         let to = Joints { s: 27.5, turn: BedTurn::accumulated(40.9), z: 2.4 };
-        let facing = UnitComplex::new(LEANING.bed.azimuth(from.turn));
-        let sweep = Sweep::new(&LEANING, facing, &from, &to);
-        let place = |share: f64| LEANING.over_bed_from_joints(&POLAR.between(&from, &to, share));
+        let facing = UnitComplex::new(leaning.bed.azimuth(from.turn));
+        let sweep = Sweep::new(&leaning, facing, &from, &to);
+        let place = |share: f64| leaning.over_bed_from_joints(&POLAR.between(&from, &to, share));
         for share in [0.0, 0.25, 0.4, 0.75, 1.0] {
             let (at, heading) = sweep.at(share);
             assert!((at.coords - place(share)).norm() < 1e-12);
