@@ -45,9 +45,18 @@ pub(crate) struct Stack<'a> {
     columns: &'a [Column],
     /// The lines of sparse infill of the layers printed, where they are found for all together.
     branches: Vec<Branches>,
-    /// Sections from `first` on, each with a thinned-out copy for comparing layers.
-    sections: VecDeque<(Section, Region)>,
+    /// Sections from `first` on.
+    sections: VecDeque<Cut>,
     first: usize,
+}
+
+/// The section of a layer.
+struct Cut {
+    section: Section,
+    /// Thinned out, for comparing layers.
+    cover: Region,
+    /// Whether the section of the layer below is the same to the last bit, as between upright walls.
+    repeats: bool,
 }
 
 impl<'a> Stack<'a> {
@@ -145,7 +154,7 @@ impl<'a> Stack<'a> {
         }
         let have = self.first + self.sections.len();
         let want = (window.end + skins.top_layers.max(1)).min(self.stage.levels.len());
-        let cut: Vec<(Section, Region)> = (have..want)
+        let cut: Vec<Cut> = (have..want)
             .into_par_iter()
             .map(|k| {
                 let mut section = self.section(k);
@@ -157,13 +166,15 @@ impl<'a> Stack<'a> {
                     section.region = compensated(section.region, is_first, &chart, how);
                 }
                 let cover = section.region.thinned(SKIN_TOLERANCE_MM);
-                (section, cover)
+                Cut { section, cover, repeats: false }
             })
             .collect();
-        for (section, _) in &cut {
-            torn(&section.tears);
+        for mut cut in cut {
+            torn(&cut.section.tears);
+            let below = self.sections.back();
+            cut.repeats = below.is_some_and(|below| below.section.region == cut.section.region);
+            self.sections.push_back(cut);
         }
-        self.sections.extend(cut);
     }
 
     fn section(&self, k: usize) -> Section {
@@ -186,7 +197,9 @@ impl<'a> Stack<'a> {
     pub(crate) fn fill(&self, window: Range<usize>) -> Vec<Filled> {
         let params = &self.job.paths;
         if self.job.paths.infill.every <= 1 {
-            return window.into_par_iter().map(|k| self.fill_one(k)).collect();
+            let runs: Vec<Vec<Filled>> =
+                self.runs(window).into_par_iter().map(|run| self.fill_run(run)).collect();
+            return runs.into_iter().flatten().collect();
         }
         let parted = window.clone().into_par_iter().map(|k| self.part(k));
         let mut parted: Vec<Option<Parted<'_>>> = parted.collect();
@@ -267,8 +280,43 @@ impl<'a> Stack<'a> {
         }
     }
 
-    fn fill_one(&self, k: usize) -> Filled {
-        self.part(k).map(|layer| layer.fill(&self.job.paths)).unwrap_or_default()
+    /// Fills layers of which each repeats the one before: they are taken apart once.
+    fn fill_run(&self, run: Range<usize>) -> Vec<Filled> {
+        let params = &self.job.paths;
+        let Some(first) = self.part(run.start) else {
+            return run.map(|_| Filled::default()).collect();
+        };
+        let fill = |k: usize| {
+            let again = first.again_on(&self.lift(k)).map(|layer| self.branched(layer, k));
+            let layer = again.or_else(|| self.part(k));
+            layer.map(|layer| layer.fill(params)).unwrap_or_default()
+        };
+        let rest: Vec<Filled> = (run.start + 1..run.end).into_par_iter().map(fill).collect();
+        std::iter::once(first.fill(params)).chain(rest).collect()
+    }
+
+    /// The layers of a window, in runs of such as are the same but for their height.
+    fn runs(&self, window: Range<usize>) -> Vec<Range<usize>> {
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for k in window.clone() {
+            match runs.last_mut() {
+                Some(run) if k > window.start && self.repeats(k) => run.end = k + 1,
+                _ => runs.push(k..k + 1),
+            }
+        }
+        runs
+    }
+
+    /// Whether a layer and all that it is compared with are those of the layer below, one higher.
+    fn repeats(&self, k: usize) -> bool {
+        if !self.columns.is_empty() || self.stage.morph.is_some() {
+            return false;
+        }
+        let ((above, below), (others_above, others_below)) = (self.beside(k), self.beside(k - 1));
+        let lowest = below.last().copied().unwrap_or(k);
+        let highest = above.last().copied().unwrap_or(k);
+        (above.len(), below.len()) == (others_above.len(), others_below.len())
+            && (lowest..=highest).all(|i| self.sections[i - self.first].repeats)
     }
 
     /// Takes a layer apart; `None` where nothing of it is.
@@ -281,7 +329,7 @@ impl<'a> Stack<'a> {
             return None;
         }
         let (above, below) = self.beside(k);
-        let cover = |i: &usize| self.at_upper(&self.sections[i - self.first].1, *i, k, &lift);
+        let cover = |i: &usize| self.at_upper(&self.sections[i - self.first].cover, *i, k, &lift);
         let above: Vec<Cow<'_, Region>> = above.iter().map(cover).collect();
         let below: Vec<Cow<'_, Region>> = below.iter().map(cover).collect();
         let neighbours = Neighbours {
@@ -290,8 +338,12 @@ impl<'a> Stack<'a> {
             support,
         };
         let parted = Parted::new(&lift, &material, &neighbours, &self.job.paths).on(support);
+        Some(self.branched(parted, k))
+    }
+
+    fn branched<'b>(&'b self, parted: Parted<'b>, k: usize) -> Parted<'b> {
         let branches = self.branches.get(k.wrapping_sub(self.stage.printed.start));
-        Some(parted.with_branches(branches.map_or(&[], Vec::as_slice)))
+        parted.with_branches(branches.map_or(&[], Vec::as_slice))
     }
 
     /// Layers of a window as they are seen along the axis, for what supports them.
@@ -308,7 +360,7 @@ impl<'a> Stack<'a> {
         let on_bed = level.index == 0 && self.stage.floor.is_none();
         let below = k.checked_sub(1).filter(|i| *i >= self.first && !on_bed);
         let hanging = below.filter(|_| !material.is_empty()).map(|i| {
-            let below = self.at_upper(&self.sections[i - self.first].1, i, k, &lift);
+            let below = self.at_upper(&self.sections[i - self.first].cover, i, k, &lift);
             hanging(&material, &below, &chart, thickness, params)
         });
         let seen = |region: &Region| chart.region_from_above(region).thinned(SEEN_TOLERANCE_MM);
@@ -333,7 +385,7 @@ impl<'a> Stack<'a> {
 
     /// The material of a layer on its upper side.
     fn material(&self, k: usize, lift: &Lift<'_>) -> Cow<'_, Region> {
-        let region = self.at_upper(&self.sections[k - self.first].0.region, k, k, lift);
+        let region = self.at_upper(&self.sections[k - self.first].section.region, k, k, lift);
         // Cones without slope are planes that may begin and end anywhere.
         if lift.floor.is_none() && lift.ceiling.is_none() {
             return region;
@@ -381,5 +433,29 @@ impl<'a> Stack<'a> {
         let above = (k + 1..=k + skins.top_layers.max(1)).take_while(|i| have.contains(i));
         let below = (k.saturating_sub(skins.bottom_layers.max(1))..k).rev();
         (above.collect(), below.take_while(|i| have.contains(i)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+
+    /// Layers that repeat the one below are what they would be if each were taken apart.
+    #[test]
+    fn runs_of_equal_layers_are_filled_as_each_of_them_alone() {
+        for (model, least) in [("gear", 20), ("steps", 20), ("cone", 0)] {
+            let solid = Solid::new(mesh::shapes::by_name(model).unwrap());
+            let job = Job::resolve(&Settings::defaults()).unwrap();
+            let (stages, _) = crate::stages::stages(&solid, &job).unwrap();
+            let mut stack = Stack::new(&solid, &stages[0], None, &job);
+            let window = stages[0].printed.clone();
+            stack.reach(&window, |_| {});
+            let alone = |k| stack.part(k).map(|layer| layer.fill(&job.paths)).unwrap_or_default();
+            let each: Vec<Filled> = window.clone().map(alone).collect();
+            let repeated = window.clone().filter(|k| *k > 0 && stack.repeats(*k)).count();
+            assert!(repeated >= least, "{model}: {repeated} of {} layers", window.len());
+            assert!(stack.fill(window) == each, "{model}");
+        }
     }
 }

@@ -15,12 +15,14 @@ use crate::toolpath::Overhang;
 pub(crate) type Hanging = (Point2<f64>, Bead, Overhang);
 
 /// What is below a layer, as beads of one width feel it.
+#[derive(Clone)]
 pub(crate) struct Below {
     /// For each degree but the least. Empty where no bead of the layer hangs over at all.
     carries: Vec<Ground>,
 }
 
 /// Where beads hang over by less than a degree.
+#[derive(Clone)]
 struct Ground {
     degree: Overhang,
     region: Region,

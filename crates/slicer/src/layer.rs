@@ -84,6 +84,7 @@ pub fn fill_layer(
 
 /// A layer taken apart into what walls, skins and sparse infill take, before lines are drawn: layers can
 /// be compared here.
+#[derive(Clone)]
 pub struct Parted<'a> {
     lift: Lift<'a>,
     material: Region,
@@ -99,6 +100,7 @@ pub struct Parted<'a> {
 }
 
 /// Sparse infill as thick as several layers.
+#[derive(Clone)]
 struct Thick<'a> {
     region: Region,
     /// From the lower side of the lowest of these layers to the upper side of this one.
@@ -108,6 +110,7 @@ struct Thick<'a> {
 }
 
 /// An island taken apart.
+#[derive(Clone)]
 struct PartedIsland {
     outline: Region,
     walls: Walls,
@@ -144,6 +147,21 @@ impl<'a> Parted<'a> {
             branches: &[],
             is_vase,
         }
+    }
+
+    /// Returns the same taken apart again on another plane: what a layer is whose section, thickness
+    /// and neighbours are those of this one. `None` where the place of the layer matters to more than
+    /// the heights of its lines.
+    #[must_use]
+    pub fn again_on(&self, lift: &Lift<'a>) -> Option<Self> {
+        let same = self.lift.level.thickness() == lift.level.thickness();
+        let is_everywhere = |lift: &Lift<'_>| {
+            let limits = lift.floor.is_some() || lift.ceiling.is_some() || lift.stair.is_some();
+            lift.level.index > 0 && lift.surface.form().is_flat() && !limits && lift.below.is_none()
+        };
+        let plain = self.thick.is_none() && self.floating.is_empty() && !self.is_vase;
+        let fits = same && plain && is_everywhere(&self.lift) && is_everywhere(lift);
+        fits.then(|| Self { lift: *lift, support: None, branches: &[], ..self.clone() })
     }
 
     /// Adds the supports of the layer.

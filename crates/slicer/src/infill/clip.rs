@@ -84,6 +84,7 @@ pub(crate) struct Crossing {
 }
 
 /// A side of a ring.
+#[derive(Clone)]
 struct Side {
     ring: usize,
     side: usize,
@@ -91,6 +92,7 @@ struct Side {
 }
 
 /// The sides of an area, by the cells that they run through.
+#[derive(Clone)]
 pub(crate) struct Sides {
     sides: Vec<Side>,
     /// The sides of all cells, one cell after the other.

@@ -241,8 +241,42 @@ mod tests {
                     let mut rings = Vec::new();
                     let facets = &cutter.facets[cutter.starts[k]..cutter.starts[k + 1]];
                     let tears = close_chains(cutter.curved_chains(facets, k, 0.001), &mut rings);
-                    assert_eq!((rings, tears), cutter.outlines(k, 0.001), "{name}, cut {k}");
+                    let planar = cutter.outlines(k, 0.001);
+                    assert_eq!((rings.len(), tears), (planar.0.len(), planar.1), "{name}, cut {k}");
+                    for (all, corners) in rings.iter().zip(&planar.0) {
+                        same_but_for_straight_points(all, corners);
+                    }
                 }
+            }
+        }
+    }
+
+    /// One way keeps points on straight lines, the other does not.
+    fn same_but_for_straight_points(all: &Ring, corners: &Ring) {
+        // Point and corners are each rounded to the grid, by half its diagonal at most.
+        const ROUNDED_MM: f64 = 1.5 / geom::grid::STEPS_PER_MM;
+        let line: Vec<_> = corners.iter().map(|p| geom::grid::mm(*p)).collect();
+        let mut left = corners.iter().peekable();
+        for p in all {
+            if left.next_if_eq(&p).is_none() {
+                let nearest = geom::polyline::nearest_on_ring(&line, &geom::grid::mm(*p)).unwrap();
+                assert!(nearest.distance <= ROUNDED_MM, "{} mm off", nearest.distance);
+            }
+        }
+        assert_eq!(left.next(), None, "a corner that the other way does not have");
+    }
+
+    /// The diagonals of upright faces cross every layer at another place.
+    #[test]
+    fn layers_of_an_upright_wall_are_equal_to_the_last_bit() {
+        for (name, z) in [("cube", 1.0..19.0), ("gear", 1.0..7.0)] {
+            let solid = Solid::new(shapes::by_name(name).unwrap());
+            let cuts = (0..40).map(|k| z.start + (z.end - z.start) * f64::from(k) / 40.0).collect();
+            let cutter = Cutter::at_levels(&solid, &Plane, cuts);
+            let first = cutter.section(0, 0.002).region;
+            assert!(!first.is_empty());
+            for k in 1..40 {
+                assert_eq!(cutter.section(k, 0.002).region, first, "{name}, layer {k}");
             }
         }
     }

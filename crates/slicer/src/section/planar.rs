@@ -1,7 +1,8 @@
 //! The cut by a plane: straight through every facet, one crossing at most on a side.
 
 use geom::grid::snap;
-use nalgebra::Point3;
+use geom::region::Ring;
+use nalgebra::{Point2, Point3};
 
 use super::chain::{Chain, Step, Trails};
 use super::{Cutter, NO_FACET};
@@ -27,7 +28,7 @@ pub(super) fn chains(cutter: &Cutter<'_>, trails: &Trails, cut: f64) -> Vec<Chai
         let share = ((cut - a) / (b - a)).clamp(0.0, 1.0);
         let vertices = &cutter.solid.mesh().vertices;
         let at = Point3::from(vertices[low].coords.lerp(&vertices[high].coords, share));
-        snap(&cutter.surface.flatten(&at))
+        cutter.surface.flatten(&at)
     };
     trails
         .outlines
@@ -39,7 +40,36 @@ pub(super) fn chains(cutter: &Cutter<'_>, trails: &Trails, cut: f64) -> Vec<Chai
             if let (false, Some(last)) = (closed, steps.last()) {
                 points.push(point(last.leave));
             }
-            Chain { points, closed: *closed }
+            Chain { points: corners(points, *closed), closed: *closed }
         })
         .collect()
+}
+
+/// A point within this of the line between its neighbours is no corner, mm: far more than the rounding
+/// of crossings, far less than a step of the grid.
+const STRAIGHT_MM: f64 = 1e-9;
+
+/// An outline on the grid, without its points on straight lines.
+///
+/// Where it crosses from one facet of a flat face to the next is another place on every layer; without
+/// these, layers of an upright wall have the same outline to the last bit.
+fn corners(mut points: Vec<Point2<f64>>, closed: bool) -> Ring {
+    // Of points as good as equal the directions between them would mean nothing.
+    let is_same = |a: &Point2<f64>, b: &Point2<f64>| (b - a).norm_squared() <= STRAIGHT_MM.powi(2);
+    points.dedup_by(|next, last| is_same(last, next));
+    while closed && points.len() > 1 && is_same(&points[0], &points[points.len() - 1]) {
+        points.pop();
+    }
+    let n = points.len();
+    let is_corner = |i: usize| {
+        if !closed && (i == 0 || i + 1 == n) {
+            return true;
+        }
+        let (before, after) = (points[(i + n - 1) % n], points[(i + 1) % n]);
+        let (into, out) = (points[i] - before, after - points[i]);
+        let across = into.perp(&out);
+        into.dot(&out) <= 0.0
+            || across * across > STRAIGHT_MM.powi(2) * (after - before).norm_squared()
+    };
+    (0..n).filter(|&i| is_corner(i)).map(|i| snap(&points[i])).collect()
 }
