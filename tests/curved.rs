@@ -290,6 +290,19 @@ fn beads_stay_within_the_part_at_the_axis_and_at_shallow_faces() {
     }
 }
 
+#[test]
+fn a_wedge_that_holds_no_bead_is_filled_by_the_layer_above() {
+    // At the rim of the dome the first layer of the bowl is 0.2 mm wide on the base.
+    let layers = ["--layers=conical", "--cone-angle=-45", "--scale=0.5"];
+    let solid = ["--set=fill_density=100%", "--set=skirts=0"];
+    let (report, code) = proved("dome", &[&layers[..], &solid].concat());
+    assert_eq!(code, 0, "{}", report["verify"]);
+    let text = sliced("dome", &[&layers[..], &solid, &SLIM].concat());
+    let told = text.lines().filter_map(|line| line.strip_prefix(";HEIGHT:"));
+    let thickest = told.map(|height| height.parse::<f64>().unwrap()).fold(0.0, f64::max);
+    assert!((0.23..0.4).contains(&thickest), "{thickest}");
+}
+
 /// The beads that hang in the air by the proof of the program.
 fn hanging(report: &serde_json::Value) -> usize {
     let findings = report["verify"]["findings"].as_array().unwrap();

@@ -245,7 +245,7 @@ impl<'a> Planner<'a> {
         let resampler = Resampler::new(printer, ResampleParams { dialect: tip, ..params.resample });
         let on_near_side = params.curved || tilter.is_some();
         let resampler = if on_near_side { resampler.on_near_side() } else { resampler };
-        let printed = params.curved.then(|| Printed::nothing(printer.rail.max));
+        let printed = params.curved.then(|| Printed::nothing(printer.rail.max, printer.nozzle));
         Self {
             printer,
             params,
@@ -287,8 +287,9 @@ impl<'a> Planner<'a> {
         Self { tells_time: true, ..self }
     }
 
-    /// The following layers have this form, which nozzles that can be turned follow.
+    /// The following layers have this form, which travel and nozzles that can be turned follow.
     pub fn follow(&mut self, form: Form) {
+        self.router.follow(form);
         if let Some(tilter) = &mut self.tilter {
             tilter.follow(form);
         }

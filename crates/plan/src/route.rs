@@ -7,6 +7,7 @@ use geom::region::Region;
 use machine::program::{self, Layer, Step};
 use nalgebra::{Point3, distance};
 use slicer::bead::Bead;
+use slicer::surface::{Form, LayerSurface, Plane};
 use slicer::toolpath::{LayerPaths, Overhang, Role, Station};
 
 use crate::comb::Comb;
@@ -144,6 +145,8 @@ pub struct Router {
     lift_speed: f64,
     /// What stands on the bed, where layers are curved.
     printed: Option<Printed>,
+    /// The surface that is being laid: its family and level.
+    surface: (Form, f64),
     /// The object of each island, where there are several.
     objects: Vec<usize>,
     items: Vec<Item>,
@@ -153,6 +156,10 @@ pub struct Router {
 /// each other in the same cell of [`Printed`].
 const CLEAR_MM: f64 = 0.1;
 
+/// How closely a way is compared with the surface that is being laid, mm: on the way a layer rises by a
+/// few times [`CLEAR_MM`] in this at most.
+const DIP_STEP_MM: f64 = 0.5;
+
 /// How a program says that a wall begins and ends in a slope, and that it is done.
 const SLOPES: &str = "scarf seam";
 
@@ -160,6 +167,12 @@ const SLOPES_END: &str = "scarf seam done";
 
 /// A line's cross-section may drift by this share before viewers are told its width.
 const AREA_DRIFT: f64 = 0.02;
+
+/// Beads thicker than their layer by more than this share say so: what a layer's own name covers.
+const THICKER: f64 = 0.15;
+
+/// Their thickness may drift by this share before it is told again.
+const HEIGHT_DRIFT: f64 = 0.05;
 
 impl Router {
     /// Returns a router whose nozzle stands at `at`, filament ready. `printed` is the empty bed where
@@ -173,6 +186,7 @@ impl Router {
             top: 0.0,
             lift_speed,
             printed,
+            surface: (Plane.form(), 0.0),
             objects: Vec::new(),
             items: Vec::new(),
         }
@@ -190,6 +204,11 @@ impl Router {
         self.top
     }
 
+    /// The following layers have this form.
+    pub(crate) fn follow(&mut self, form: Form) {
+        self.surface.0 = form;
+    }
+
     /// Says to which of several objects the islands of the next layer belong.
     pub(crate) fn belong_to(&mut self, objects: Vec<usize>) {
         self.objects = objects;
@@ -204,6 +223,7 @@ impl Router {
         speeds: &Speeds,
         filament: &FilamentParams,
     ) -> Vec<Item> {
+        self.surface.1 = layer.upper;
         let highest = lines.iter().flat_map(|line| &line.stations).map(|station| station.at.z);
         self.top = highest.fold(self.top, f64::max);
         self.items.push(Item::Step(Step::Layer(Layer {
@@ -227,7 +247,7 @@ impl Router {
             if line.slopes {
                 self.items.push(said(SLOPES));
             }
-            self.line(line, layer.index == 0, speeds, filament);
+            self.line(line, (layer.index == 0, layer.thickness), speeds, filament);
             if line.slopes {
                 self.items.push(said(SLOPES_END));
             }
@@ -285,21 +305,45 @@ impl Router {
             self.retract(filament);
         }
         let lift = if self.retracted { filament.retract_lift } else { 0.0 };
-        match self.printed.as_ref().map(|printed| printed.over(&self.at, &to)) {
-            Some((above, _)) if lift == 0.0 && above <= CLEAR_MM => {
-                if self.at != to {
-                    self.stroke(Kind::Travel, to, 0.0, speed);
-                }
+        let (above, highest) = match &self.printed {
+            Some(printed) => printed.over(&self.at, &to),
+            None => (f64::INFINITY, 0.0),
+        };
+        let beside = self.beside(&to);
+        if lift == 0.0 && above <= CLEAR_MM && beside.is_none() {
+            if self.at != to {
+                self.stroke(Kind::Travel, to, 0.0, speed);
             }
-            over => {
-                let highest = over.map_or(0.0, |(_, highest)| highest);
-                self.go_over(to, self.at.z.max(to.z).max(highest) + lift, speed);
-            }
+        } else {
+            let highest = highest.max(beside.unwrap_or(0.0));
+            self.go_over(to, self.at.z.max(to.z).max(highest) + lift, speed);
         }
         if self.retracted {
             self.stroke(Kind::Filament, to, filament.retract_length, filament.retract_speed);
             self.retracted = false;
         }
+    }
+
+    /// How high the nozzle must be on its way to `to` for what stands beside that, mm; `None` where the
+    /// straight way clears it.
+    fn beside(&self, to: &Point3<f64>) -> Option<f64> {
+        let printed = self.printed.as_ref()?;
+        let (form, level) = self.surface;
+        let height = |p: &Point3<f64>| form.height(level, p.x.hypot(p.y));
+        let (from, way) = (self.at, to - self.at);
+        let samples = (way.xy().norm() / DIP_STEP_MM).ceil().max(1.0);
+        let places = (0..=samples as u32).map(|k| from + way * (f64::from(k) / samples));
+        let (dip, highest) = places.fold((0.0_f64, 0.0_f64), |(dip, highest), p| {
+            let height = height(&p);
+            (dip.max(height - p.z), highest.max(height))
+        });
+        let lowest = from.z.min(to.z);
+        if dip <= CLEAR_MM {
+            return None;
+        }
+        // On the surface itself the nozzle clears everything.
+        let needed = printed.beside(&from.xy(), &to.xy(), lowest).min(highest);
+        (needed > lowest).then_some(needed)
     }
 
     /// Goes to the begin of a line inside the island of the last one, though the straight way leaves it;
@@ -383,15 +427,31 @@ impl Router {
         drawn
     }
 
+    /// Says how thick a bead is where that is much more than its layer: in a wedge, or over one that no
+    /// bead fits in.
+    fn tell_height(&mut self, thickness: f64, of_layer: f64, told: &mut Option<f64>) {
+        let wanted = (thickness > (1.0 + THICKER) * of_layer).then_some(thickness);
+        let is_told = match (wanted, &told) {
+            (Some(wanted), Some(told)) => (wanted - *told).abs() <= HEIGHT_DRIFT * *told,
+            (None, None) => true,
+            _ => false,
+        };
+        if !is_told {
+            self.items.push(Item::Step(Step::Height(wanted)));
+            *told = wanted;
+        }
+    }
+
     fn line(
         &mut self,
         line: &OrderedLine,
-        is_first_layer: bool,
+        (is_first_layer, layer_thickness): (bool, f64),
         speeds: &Speeds,
         filament: &FilamentParams,
     ) {
         let wanted = speeds.of(line.role, is_first_layer);
         let (mut told, mut told_hangs) = ((f64::NAN, None), false);
+        let mut told_height: Option<f64> = None;
         let is_combined = line.role == Role::CombinedInfill;
         if let Some(first) = line.stations.first().filter(|_| is_combined) {
             self.items.push(Item::Step(Step::Height(Some(first.bead.thickness))));
@@ -409,6 +469,10 @@ impl Router {
                 told_hangs = hangs;
             }
             let role = program_role(line.role, overhang);
+            if !is_combined {
+                let thickness = f64::midpoint(pair[0].bead.thickness, pair[1].bead.thickness);
+                self.tell_height(thickness, layer_thickness, &mut told_height);
+            }
             let drift = (area - told.0).abs();
             if drift.is_nan() || drift > AREA_DRIFT * told.0 || Some(role) != told.1 {
                 self.items.push(Item::Step(Step::Bead(role, width)));
@@ -423,7 +487,7 @@ impl Router {
                 printed.add(&pair[0].at, &pair[1].at);
             }
         }
-        if is_combined {
+        if is_combined || told_height.is_some() {
             self.items.push(Item::Step(Step::Height(None)));
         }
         if told_hangs {
@@ -605,7 +669,7 @@ mod tests {
     #[test]
     fn travel_over_a_dome_rises_above_it_and_no_higher() {
         let filament = FilamentParams { retract_length: 0.0, ..FILAMENT };
-        let printed = Some(Printed::nothing(50.0));
+        let printed = Some(Printed::nothing(50.0, machine::profile::NozzleShape::COMMON));
         let mut router = Router::new(Point3::new(0.0, -9.0, 5.0), 10.0, printed);
         let lines = [line(&[[0.0, -9.0], [0.0, 9.0]], 5.0), line(&[[-9.0, 0.0], [-8.0, 0.0]], 1.0)];
         let to_the_foot = strokes(&router.layer(&layer(), &lines, &SPEEDS, &filament));

@@ -53,11 +53,17 @@ pub(crate) struct Stack<'a> {
 /// The section of a layer.
 struct Cut {
     section: Section,
-    /// Thinned out, for comparing layers.
+    /// A thinned-out copy for comparing layers.
     cover: Region,
+    /// What of the floor the layer leaves bare, in its own chart and in that of the layer above.
+    bare: [Region; 2],
     /// Whether the section of the layer below is the same to the last bit, as between upright walls.
     repeats: bool,
 }
+
+/// Wedges on the floor narrower than this share of the least width of a bead that is printed are left to
+/// the layer above: so near that width, only bits and pieces of a bead would be laid.
+const BARE_IN_WIDTHS: f64 = 1.5;
 
 impl<'a> Stack<'a> {
     pub(crate) fn new(
@@ -166,7 +172,8 @@ impl<'a> Stack<'a> {
                     section.region = compensated(section.region, is_first, &chart, how);
                 }
                 let cover = section.region.thinned(SKIN_TOLERANCE_MM);
-                Cut { section, cover, repeats: false }
+                let bare = self.left_bare(&cover, k);
+                Cut { section, cover, bare, repeats: false }
             })
             .collect();
         for mut cut in cut {
@@ -175,6 +182,20 @@ impl<'a> Stack<'a> {
             cut.repeats = below.is_some_and(|below| below.section.region == cut.section.region);
             self.sections.push_back(cut);
         }
+    }
+
+    /// What of the floor the section of a layer leaves bare, in its chart and in that of the layer above.
+    fn left_bare(&self, section: &Region, k: usize) -> [Region; 2] {
+        let Stage { floor, levels, printed, morph, surface, .. } = self.stage;
+        if floor.is_none() || morph.is_some() || !printed.contains(&k) || k + 1 >= levels.len() {
+            return [Region::default(), Region::default()];
+        }
+        let lift = self.lift(k);
+        let material = self.at_upper(section, k, k, &lift);
+        let least = BARE_IN_WIDTHS * self.job.paths.thin.least_width;
+        let bare = lift.left_bare(&material, least);
+        let above = carried(&**surface, &bare, levels[k].upper, levels[k + 1].upper);
+        [bare, above]
     }
 
     fn section(&self, k: usize) -> Section {
@@ -376,11 +397,15 @@ impl<'a> Stack<'a> {
         let level = levels[k];
         if let Some(sides) = &self.stage.morph {
             let (surface, below) = (sides[k + 1].sheet.surface(), Some(sides[k]));
-            return Lift { surface, level, floor: None, ceiling: None, stair: None, below };
+            let (floor, ceiling, stair, bare) = (None, None, None, None);
+            return Lift { surface, level, floor, ceiling, stair, below, bare };
         }
         let stair = self.stair.filter(|_| k == self.stage.printed.start);
         let (floor, ceiling) = (*floor, *ceiling);
-        Lift { surface: &**surface, level, floor, ceiling, stair, below: None }
+        // Its own stage has a layer below, but for the first one.
+        let below = k.checked_sub(self.first + 1).and_then(|i| self.sections.get(i));
+        let bare = below.map(|cut| &cut.bare[1]).filter(|bare| !bare.is_empty());
+        Lift { surface: &**surface, level, floor, ceiling, stair, below: None, bare }
     }
 
     /// The material of a layer on its upper side.
@@ -390,7 +415,9 @@ impl<'a> Stack<'a> {
         if lift.floor.is_none() && lift.ceiling.is_none() {
             return region;
         }
-        Cow::Owned(lift.printable(&region))
+        let printable = lift.printable(&region);
+        let bare = &self.sections[k - self.first].bare[0];
+        Cow::Owned(if bare.is_empty() { printable } else { printable.difference(bare) })
     }
 
     /// A region of layer `i`, taken to the upper side of layer `k`: there the nozzle runs, and that is

@@ -6,13 +6,14 @@
 //! Where layers begin on a flat floor, beads are as thick as [`stacking`](crate::stacking) says.
 
 use geom::grid::{GridPoint, mm};
-use geom::region::{Fill, Region};
+use geom::polyline::distance_to_segment;
+use geom::region::{Fill, Region, ring_sides};
 use nalgebra::{Point2, Point3, center};
 
 use crate::bead::Bead;
 use crate::blend::Side;
 use crate::level::Level;
-use crate::stacking::{Stair, WedgeRule};
+use crate::stacking::{Stair, WedgeRule, depth};
 use crate::surface::LayerSurface;
 use crate::toolpath::{Overhang, Station};
 
@@ -32,6 +33,17 @@ const CEILING_SLACK_MM: f64 = 1e-6;
 /// The least printable thickness of a wedge, as a share of the layer's.
 pub const LEAST_WEDGE_SHARE: f64 = 0.5;
 
+/// How far from the border of a wedge on the floor places may be narrow, as a multiple of the least width
+/// of a bead: the wedge itself, and as much again that its corners taper off in.
+const NARROW_IN_WIDTHS: f64 = 2.0;
+
+/// What is left bare counts from here, mm²: a quarter of a square millimetre under half a layer is the
+/// volume of 0.3 mm of a bead.
+const LEAST_BARE_MM2: f64 = 0.25;
+
+/// Places across each part of a bead at which its thickness is looked at where it reaches over bare floor.
+const ACROSS: u32 = 6;
+
 /// One layer in space. See the [module](self).
 #[derive(Clone, Copy)]
 pub struct Lift<'a> {
@@ -47,6 +59,9 @@ pub struct Lift<'a> {
     pub stair: Option<Stair<'a>>,
     /// The layer below, where it is another surface than this one lifted.
     pub below: Option<Side>,
+    /// Where the layer below leaves the floor bare because no bead fits there, in the chart of this one:
+    /// here this layer goes down to the floor.
+    pub bare: Option<&'a Region>,
 }
 
 impl Lift<'_> {
@@ -90,6 +105,33 @@ impl Lift<'_> {
             self.level.thickness() * self.surface.thickness_per_level(p) / self.surface.slope_cos(p)
         };
         self.where_holds(region, true, |p| p.z - floor >= 2.0 * upright(p))
+    }
+
+    /// Returns where no bead fits between the floor, or what is too thin above it, and a side of the part;
+    /// `laid` is where the layer is thick enough.
+    #[must_use]
+    pub fn left_bare(&self, material: &Region, least_width: f64) -> Region {
+        let (Some(_), Some(bounds)) = (self.floor, material.bounds()) else {
+            return Region::default();
+        };
+        let corner = |p: GridPoint| mm(p).coords.abs();
+        let reach = corner(bounds.min).sup(&corner(bounds.max)).norm();
+        let is_laid = |s: f64| self.thickness(&self.point(&Point2::new(s, 0.0))) > 0.0;
+        // From the border to where another side of the part no longer matters.
+        let (border, inwards) = match (is_laid(0.0), is_laid(reach)) {
+            (true, false) => (border(0.0, reach, is_laid), -least_width),
+            (false, true) => (border(reach, 0.0, is_laid), least_width),
+            _ => return Region::default(),
+        };
+        if !passes(material, border, border + NARROW_IN_WIDTHS * inwards) {
+            return Region::default();
+        }
+        let rim = between(material, border, border + 2.0 * NARROW_IN_WIDTHS * inwards);
+        let chart = self.surface.chart(self.level.upper);
+        let held = chart.outset(&chart.opened(&rim, least_width / 2.0), least_width / 2.0);
+        // At its other side the rim has corners that the material has not.
+        between(&rim.difference(&held), border, border + NARROW_IN_WIDTHS * inwards)
+            .without_small_islands(LEAST_BARE_MM2)
     }
 
     /// The part of a region where a condition holds that changes once on the meridian: layers fall
@@ -155,15 +197,40 @@ impl Lift<'_> {
         if self.is_even() {
             return Station { at, bead, overhang };
         }
-        let thickness = match &self.stair {
+        let thickness = match (&self.stair, self.bare) {
             // The bead lies over edges of curved layers.
-            Some(stair) => stair.mean_thickness(at.x.hypot(at.y), bead.spacing()),
-            None => self.thickness(&at),
+            (Some(stair), _) => stair.mean_thickness(at.x.hypot(at.y), bead.spacing()),
+            (None, Some(bare)) => self.mean_thickness(uv, bead.spacing(), bare),
+            (None, None) => self.thickness(&at),
         };
         if thickness == bead.thickness {
             return Station { at, bead, overhang };
         }
         Station { at, bead: Bead::with_spacing(bead.spacing(), thickness), overhang }
+    }
+
+    /// The thickness of a bead that may reach over bare floor: the mean across it where it does, mm.
+    fn mean_thickness(&self, uv: &Point2<f64>, width: f64, bare: &Region) -> f64 {
+        let s = uv.coords.norm();
+        let (Some(base), true) = (self.floor, s > width) else {
+            return self.thickness(&self.point(uv));
+        };
+        let end = |share: f64| uv * (1.0 + share * width / s);
+        let parts = bare.parts(&end(-0.5), &end(0.5));
+        if !parts.iter().any(|part| part.inside) {
+            return self.thickness(&self.point(uv));
+        }
+        let volume = parts.iter().flat_map(|part| {
+            let share = part.length() / f64::from(ACROSS);
+            (0..ACROSS).map(move |k| {
+                let along = (f64::from(k) + 0.5) / f64::from(ACROSS);
+                let at = self.point(&(part.from + (part.to - part.from) * along));
+                let depth =
+                    if part.inside { depth(self.surface, &at, base) } else { self.thickness(&at) };
+                share * depth
+            })
+        });
+        volume.sum::<f64>() / width
     }
 
     /// Appends the stations strictly between two points of the chart.
@@ -220,6 +287,29 @@ fn border(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64
     inside
 }
 
+/// Whether an outline comes between these distances from the axis.
+fn passes(region: &Region, a: f64, b: f64) -> bool {
+    let (near, far) = (a.min(b), a.max(b));
+    let origin = Point2::origin();
+    region.rings().any(|ring| {
+        ring_sides(ring).any(|(p, q)| {
+            let (p, q) = (mm(p), mm(q));
+            let most = p.coords.norm().max(q.coords.norm());
+            most >= near && distance_to_segment(&p, &q, &origin) <= far
+        })
+    })
+}
+
+/// The part of a region between these distances from the axis.
+fn between(region: &Region, a: f64, b: f64) -> Region {
+    let (near, far) = (a.min(b), a.max(b));
+    if far <= 0.0 {
+        return Region::default();
+    }
+    let within = region.intersection(&disc(far));
+    if near > 0.0 { within.difference(&disc(near)) } else { within }
+}
+
 /// A disc about the axis, to within [`CHORD_MM`].
 fn disc(radius: f64) -> Region {
     let step = 2.0 * (1.0 - (CHORD_MM / radius).min(0.5)).acos();
@@ -246,8 +336,15 @@ mod tests {
     #[test]
     fn flat_lines_keep_their_points() {
         let level = Level { index: 3, lower: 0.6, upper: 0.8 };
-        let lift =
-            Lift { surface: &Plane, level, floor: None, ceiling: None, stair: None, below: None };
+        let lift = Lift {
+            surface: &Plane,
+            level,
+            floor: None,
+            ceiling: None,
+            stair: None,
+            below: None,
+            bare: None,
+        };
         let stations = lift.stations(&line(&[[-8.0, 1.0], [8.0, 1.0], [0.0, 9.0]]), true);
         assert_eq!(stations.len(), 3);
         assert!(stations.iter().all(|s| s.bead == BEAD && s.at.z == 0.8));
@@ -260,8 +357,15 @@ mod tests {
         let families: [(&dyn LayerSurface, f64); 2] = [(&cone, 0.5_f64.cos()), (&spheres, 1.0)];
         for (surface, cos) in families {
             let level = Level { index: 0, lower: 20.0, upper: 20.0 + 0.2 / cos };
-            let lift =
-                Lift { surface, level, floor: None, ceiling: None, stair: None, below: None };
+            let lift = Lift {
+                surface,
+                level,
+                floor: None,
+                ceiling: None,
+                stair: None,
+                below: None,
+                bare: None,
+            };
             let stations = lift.stations(&line(&[[-12.0, 3.0], [9.0, 3.0], [4.0, -11.0]]), false);
             assert!((20..400).contains(&stations.len()), "{}", stations.len());
             for pair in stations.windows(2) {
@@ -288,6 +392,7 @@ mod tests {
             ceiling: None,
             stair: None,
             below: None,
+            bare: None,
         };
         let at = |z: f64| Point3::new((5.0 - z) / angle.tan(), 0.0, z);
         assert!((lift.thickness(&at(3.0)) - 0.2).abs() < 1e-6);

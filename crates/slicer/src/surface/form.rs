@@ -106,6 +106,20 @@ impl Form {
         }
     }
 
+    /// Returns at which height (mm) a layer lies at distance `r` from the axis; not a number where it does
+    /// not reach.
+    #[must_use]
+    pub fn height(&self, level: f64, r: f64) -> f64 {
+        let sagged = |radius: f64| level - r * r / (radius + (radius * radius - r * r).sqrt());
+        match self.kind {
+            Kind::Plane => level,
+            Kind::Cone { slope } if self.is_mirrored => level + slope * r,
+            Kind::Cone { slope } => level - slope * r,
+            Kind::Spheres { centre_z } => sagged(level - centre_z),
+            Kind::Caps { radius } => sagged(radius),
+        }
+    }
+
     /// Returns whether convex coordinates have z negated, and F is the negated level.
     #[must_use]
     pub fn is_mirrored(&self) -> bool {
