@@ -9,14 +9,14 @@ mod revolve;
 mod sphere;
 
 pub use extrude::{extruded, gear};
-pub use revolve::{cone, dome, lens, mushroom, revolved, torus, vase};
+pub use revolve::{cone, dome, lens, mushroom, revolved, torus, umbrella, vase};
 pub use sphere::icosphere;
 
 use crate::mesh::Mesh;
 use nalgebra::Point3;
 
 /// The names that [`by_name`] knows, sorted.
-pub const NAMES: [&str; 15] = [
+pub const NAMES: [&str; 16] = [
     "cone",
     "cross",
     "cube",
@@ -29,6 +29,7 @@ pub const NAMES: [&str; 15] = [
     "steps",
     "tetrahedron",
     "torus",
+    "umbrella",
     "vase",
     "wall-0.6",
     "wall-1.0",
@@ -50,6 +51,7 @@ pub fn by_name(name: &str) -> Option<Mesh> {
         "steps" => steps(),
         "tetrahedron" => tetrahedron(30.0),
         "torus" => torus(20.0, 6.0, 72, 24),
+        "umbrella" => umbrella(96),
         "vase" => vase(72),
         "wall-0.6" => block(40.0, 0.6, 20.0),
         "wall-1.0" => block(40.0, 1.0, 20.0),

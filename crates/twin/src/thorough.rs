@@ -196,13 +196,18 @@ impl<'a> Watch<'a> {
         hollow.piece(&step, &self.openings, self.thickness);
     }
 
-    /// Returns whether the place halfway down the layer below belongs to the part; without a mesh,
-    /// whether that is what the bead is for.
+    /// Returns whether the place halfway down the layer below belongs to the part, and, where nothing lies
+    /// there for another layer, the one below that, too: what is left out at the very underside of a part
+    /// carries nothing. Without a mesh, whether that is what the bead is for.
     fn is_inside(&self, ends: &[Point3<f64>; 2], role: Role) -> bool {
         let Some(part) = &self.part else { return role == Role::InternalInfill };
         let middle = center(&ends[0], &ends[1]);
         let normal = self.mark.and_then(|mark| mark.family).unwrap_or_default().normal(&middle);
-        part.winding(&(middle - normal * (HALFWAY_DOWN * self.thickness))) != 0
+        let is_part =
+            |layers: f64| part.winding(&(middle - normal * (layers * self.thickness))) != 0;
+        let deepest = self.pile.openings().iter().map(|opening| opening.depth).fold(0.0, f64::max);
+        let goes_on = deepest > HALFWAY_DOWN * self.thickness;
+        is_part(HALFWAY_DOWN) && (!goes_on || is_part(HALFWAY_DOWN + 1.0))
     }
 
     fn thickness_of(&self, segment: &Segment, mark: &LayerMark) -> f64 {

@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn round_parts_have_none() {
-        for name in ["cone", "dome", "lens", "mushroom", "torus", "vase"] {
+        for name in ["cone", "dome", "lens", "mushroom", "torus", "umbrella", "vase"] {
             let mesh = shapes::by_name(name).unwrap();
             assert_eq!(reference_azimuth(&mesh), 0.0, "{name}");
         }

@@ -112,6 +112,28 @@ pub fn mushroom(n_segments: u32) -> Mesh {
     revolved(&profile, n_segments)
 }
 
+/// Returns an umbrella blown inside out: a thin cover on a stem that rises outwards by 15°.
+#[must_use]
+pub fn umbrella(n_segments: u32) -> Mesh {
+    const STEM: f64 = 4.0;
+    const RIM: f64 = 25.0;
+    const UNDERSIDE: f64 = 15.0;
+    const THICKNESS: f64 = 2.4;
+    let rise = 15.0_f64.to_radians().tan();
+    let cover = |r: f64| UNDERSIDE + rise * (r - STEM);
+    let profile = [
+        [0.0, 0.0],
+        [8.0, 0.0],
+        [8.0, 1.5],
+        [STEM, 3.5],
+        [STEM, cover(STEM)],
+        [RIM, cover(RIM)],
+        [RIM, cover(RIM) + THICKNESS],
+        [0.0, cover(0.0) + THICKNESS],
+    ];
+    revolved(&profile, n_segments)
+}
+
 /// Returns a vase with a wall of 1.2 mm and a bottom of 1.6 mm.
 #[must_use]
 pub fn vase(n_segments: u32) -> Mesh {
