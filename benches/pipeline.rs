@@ -69,6 +69,7 @@ fn filled(model: &Model, covers: &[Region], job: &Job) -> usize {
             ceiling: None,
             stair: None,
             below: None,
+            bare: None,
         };
         fill_layer(&lift, material, &neighbours, &job.paths).paths.islands.len()
     };

@@ -88,6 +88,10 @@ fn solid_spheres_hold_the_volume() {
     for name in ["dome", "lens", "mushroom"] {
         holds_its_volume(name, &["--layers", "spherical"]);
     }
+    let steep = ["--layers=spherical", "--sphere-centre=-20"];
+    for name in ["dome", "lens"] {
+        holds_its_volume(name, &[&steep[..], &SLIM].concat());
+    }
 }
 
 /// Volume and length of what is laid in each layer.

@@ -55,8 +55,10 @@ struct Cut {
     section: Section,
     /// A thinned-out copy for comparing layers.
     cover: Region,
-    /// What of the floor the layer leaves bare, in its own chart and in that of the layer above.
-    bare: [Region; 2],
+    /// Where the wedge of the layer on the floor is too narrow for a bead, in its chart.
+    narrow: Region,
+    /// What of that is left to the layer above, in the charts of both; known when that is cut.
+    bare: Option<[Region; 2]>,
     /// Whether the section of the layer below is the same to the last bit, as between upright walls.
     repeats: bool,
 }
@@ -64,6 +66,9 @@ struct Cut {
 /// Wedges on the floor narrower than this share of the least width of a bead that is printed are left to
 /// the layer above: so near that width, only bits and pieces of a bead would be laid.
 const BARE_IN_WIDTHS: f64 = 1.5;
+
+/// The next layer takes over what it can lay this share of.
+const TAKEN_SHARE: f64 = 0.5;
 
 impl<'a> Stack<'a> {
     pub(crate) fn new(
@@ -172,8 +177,8 @@ impl<'a> Stack<'a> {
                     section.region = compensated(section.region, is_first, &chart, how);
                 }
                 let cover = section.region.thinned(SKIN_TOLERANCE_MM);
-                let bare = self.left_bare(&cover, k);
-                Cut { section, cover, bare, repeats: false }
+                let narrow = self.narrow(&cover, k);
+                Cut { section, cover, narrow, bare: None, repeats: false }
             })
             .collect();
         for mut cut in cut {
@@ -182,20 +187,41 @@ impl<'a> Stack<'a> {
             cut.repeats = below.is_some_and(|below| below.section.region == cut.section.region);
             self.sections.push_back(cut);
         }
+        for i in 0..self.sections.len().saturating_sub(1) {
+            if self.sections[i].bare.is_none() {
+                let bare = self.left_bare(self.first + i);
+                self.sections[i].bare = Some(bare);
+            }
+        }
     }
 
-    /// What of the floor the section of a layer leaves bare, in its chart and in that of the layer above.
-    fn left_bare(&self, section: &Region, k: usize) -> [Region; 2] {
-        let Stage { floor, levels, printed, morph, surface, .. } = self.stage;
-        if floor.is_none() || morph.is_some() || !printed.contains(&k) || k + 1 >= levels.len() {
-            return [Region::default(), Region::default()];
+    /// Where the wedge of a layer on the floor is too narrow for a bead, in its chart.
+    fn narrow(&self, section: &Region, k: usize) -> Region {
+        let Stage { floor, printed, morph, .. } = self.stage;
+        if floor.is_none() || morph.is_some() || !printed.contains(&k) {
+            return Region::default();
         }
         let lift = self.lift(k);
         let material = self.at_upper(section, k, k, &lift);
-        let least = BARE_IN_WIDTHS * self.job.paths.thin.least_width;
-        let bare = lift.left_bare(&material, least);
-        let above = carried(&**surface, &bare, levels[k].upper, levels[k + 1].upper);
-        [bare, above]
+        lift.too_narrow(&material, BARE_IN_WIDTHS * self.job.paths.thin.least_width)
+    }
+
+    /// What layer `k` leaves to the next, which has room for a bead there, in the charts of both.
+    fn left_bare(&self, k: usize) -> [Region; 2] {
+        let narrow = &self.sections[k - self.first].narrow;
+        if narrow.is_empty() || !self.stage.printed.contains(&(k + 1)) {
+            return [Region::default(), Region::default()];
+        }
+        let levels = &self.stage.levels;
+        let [from, to] = [k, k + 1].map(|k| levels[k].upper);
+        let above = self.material(k + 1, &self.lift(k + 1));
+        let above = above.difference(&self.sections[k + 1 - self.first].narrow);
+        let seen = carried(&*self.stage.surface, narrow, from, to);
+        let taken = seen.filtered(|island| {
+            let island = Region::from_island((*island).clone());
+            island.intersection(&above).area() >= TAKEN_SHARE * island.area()
+        });
+        [carried(&*self.stage.surface, &taken, to, from), taken]
     }
 
     fn section(&self, k: usize) -> Section {
@@ -404,7 +430,8 @@ impl<'a> Stack<'a> {
         let (floor, ceiling) = (*floor, *ceiling);
         // Its own stage has a layer below, but for the first one.
         let below = k.checked_sub(self.first + 1).and_then(|i| self.sections.get(i));
-        let bare = below.map(|cut| &cut.bare[1]).filter(|bare| !bare.is_empty());
+        let bare = below.and_then(|cut| cut.bare.as_ref()).map(|[_, above]| above);
+        let bare = bare.filter(|bare| !bare.is_empty());
         Lift { surface: &**surface, level, floor, ceiling, stair, below: None, bare }
     }
 
@@ -416,8 +443,12 @@ impl<'a> Stack<'a> {
             return region;
         }
         let printable = lift.printable(&region);
-        let bare = &self.sections[k - self.first].bare[0];
-        Cow::Owned(if bare.is_empty() { printable } else { printable.difference(bare) })
+        let bare = self.sections[k - self.first].bare.as_ref();
+        let bare = bare.map(|[own, _]| own).filter(|own| !own.is_empty());
+        Cow::Owned(match bare {
+            Some(bare) => printable.difference(bare),
+            None => printable,
+        })
     }
 
     /// A region of layer `i`, taken to the upper side of layer `k`: there the nozzle runs, and that is

@@ -7,7 +7,7 @@
 
 use geom::grid::{GridPoint, mm};
 use geom::polyline::distance_to_segment;
-use geom::region::{Fill, Region, ring_sides};
+use geom::region::{Fill, Part, Region, ring_sides};
 use nalgebra::{Point2, Point3, center};
 
 use crate::bead::Bead;
@@ -41,8 +41,8 @@ const NARROW_IN_WIDTHS: f64 = 2.0;
 /// volume of 0.3 mm of a bead.
 const LEAST_BARE_MM2: f64 = 0.25;
 
-/// Places across each part of a bead at which its thickness is looked at where it reaches over bare floor.
-const ACROSS: u32 = 6;
+/// By how much the depth of a place changes along a layer, at most: that of layers of 60°.
+const STEEPEST_WEDGE: f64 = 1.75;
 
 /// One layer in space. See the [module](self).
 #[derive(Clone, Copy)]
@@ -107,10 +107,10 @@ impl Lift<'_> {
         self.where_holds(region, true, |p| p.z - floor >= 2.0 * upright(p))
     }
 
-    /// Returns where no bead fits between the floor, or what is too thin above it, and a side of the part;
-    /// `laid` is where the layer is thick enough.
+    /// Returns where less than `least_width` (mm) of the layer lies between where it ends on the floor and a
+    /// side of the part; `material` is its section, thick enough to be laid or not.
     #[must_use]
-    pub fn left_bare(&self, material: &Region, least_width: f64) -> Region {
+    pub fn too_narrow(&self, material: &Region, least_width: f64) -> Region {
         let (Some(_), Some(bounds)) = (self.floor, material.bounds()) else {
             return Region::default();
         };
@@ -197,10 +197,10 @@ impl Lift<'_> {
         if self.is_even() {
             return Station { at, bead, overhang };
         }
-        let thickness = match (&self.stair, self.bare) {
+        let thickness = match (&self.stair, self.floor.filter(|_| self.below.is_none())) {
             // The bead lies over edges of curved layers.
             (Some(stair), _) => stair.mean_thickness(at.x.hypot(at.y), bead.spacing()),
-            (None, Some(bare)) => self.mean_thickness(uv, bead.spacing(), bare),
+            (None, Some(base)) => self.mean_thickness(uv, bead.spacing(), base),
             (None, None) => self.thickness(&at),
         };
         if thickness == bead.thickness {
@@ -209,26 +209,32 @@ impl Lift<'_> {
         Station { at, bead: Bead::with_spacing(bead.spacing(), thickness), overhang }
     }
 
-    /// The thickness of a bead that may reach over bare floor: the mean across it where it does, mm.
-    fn mean_thickness(&self, uv: &Point2<f64>, width: f64, bare: &Region) -> f64 {
+    /// The mean thickness across a bead of a layer on a floor, mm: over a wedge it changes within the width
+    /// of a bead, and over places that the layer below leaves bare the bead goes down to the floor.
+    fn mean_thickness(&self, uv: &Point2<f64>, width: f64, base: f64) -> f64 {
+        let at = self.point(uv);
+        let nominal = self.level.thickness() * self.surface.thickness_per_level(&at);
+        let rule = WedgeRule { base, least: LEAST_WEDGE_SHARE * nominal };
+        let depth_here = depth(self.surface, &at, base);
+        let shallowest = depth_here - width / 2.0 * STEEPEST_WEDGE;
         let s = uv.coords.norm();
-        let (Some(base), true) = (self.floor, s > width) else {
-            return self.thickness(&self.point(uv));
-        };
-        let end = |share: f64| uv * (1.0 + share * width / s);
-        let parts = bare.parts(&end(-0.5), &end(0.5));
-        if !parts.iter().any(|part| part.inside) {
-            return self.thickness(&self.point(uv));
+        if self.bare.is_none() && shallowest > nominal + rule.least || s <= width {
+            return rule.thickness_at_depth(depth_here, nominal);
         }
-        let volume = parts.iter().flat_map(|part| {
-            let share = part.length() / f64::from(ACROSS);
-            (0..ACROSS).map(move |k| {
-                let along = (f64::from(k) + 0.5) / f64::from(ACROSS);
-                let at = self.point(&(part.from + (part.to - part.from) * along));
-                let depth =
-                    if part.inside { depth(self.surface, &at, base) } else { self.thickness(&at) };
-                share * depth
-            })
+        let end = |share: f64| uv * (1.0 + share * width / s);
+        let ends = (end(-0.5), end(0.5));
+        let parts = match self.bare {
+            Some(bare) => bare.parts(&ends.0, &ends.1),
+            None => vec![Part { from: ends.0, to: ends.1, inside: false }],
+        };
+        let volume = parts.iter().map(|part| {
+            let depths = [part.from, part.to].map(|p| depth(self.surface, &self.point(&p), base));
+            let mean = if part.inside {
+                f64::midpoint(depths[0], depths[1])
+            } else {
+                rule.mean_thickness(depths, nominal)
+            };
+            part.length() * mean
         });
         volume.sum::<f64>() / width
     }

@@ -43,6 +43,22 @@ impl WedgeRule {
         }
     }
 
+    /// Returns the mean thickness over places whose depth changes evenly between two values, in a layer
+    /// `nominal` thick, all mm.
+    #[must_use]
+    pub fn mean_thickness(&self, [a, b]: [f64; 2], nominal: f64) -> f64 {
+        // The integral of the thickness over the depth.
+        let sum = |depth: f64| {
+            let wedge = depth.clamp(self.least, nominal + self.least);
+            let beyond = (depth - nominal - self.least).max(0.0);
+            (wedge * wedge - self.least * self.least) / 2.0 + nominal * beyond
+        };
+        if (b - a).abs() < EVEN_MM {
+            return self.thickness_at_depth(f64::midpoint(a, b), nominal);
+        }
+        (sum(b) - sum(a)) / (b - a)
+    }
+
     /// Returns the pieces of a line of a layer `nominal` thick between two depths, in order;
     /// depths change evenly along it, and so does the thickness in each piece.
     #[must_use]
@@ -68,6 +84,9 @@ impl WedgeRule {
             .collect()
     }
 }
+
+/// Depths that differ by less are one, mm: far below what any bead is thick, and far above rounding.
+const EVEN_MM: f64 = 1e-7;
 
 /// The curved layers that end below a flat top: where each place of the first planar layer above
 /// them finds its ground.
@@ -160,6 +179,18 @@ pub fn depth(surface: &dyn LayerSurface, p: &Point3<f64>, base: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::surface::{Caps, Cone, Spheres};
+
+    #[test]
+    fn the_mean_over_a_wedge_is_that_of_its_places() {
+        let rule = WedgeRule { base: 0.0, least: 0.1 };
+        for [a, b] in [[0.0, 0.5], [0.05, 0.2], [0.45, 0.15], [0.2, 0.2], [0.02, 0.08], [0.4, 0.9]]
+        {
+            let at = |k: u32| a + (b - a) * (f64::from(k) + 0.5) / 10_000.0;
+            let places = (0..10_000).map(|k| rule.thickness_at_depth(at(k), 0.2));
+            let mean = places.sum::<f64>() / 10_000.0;
+            assert!((rule.mean_thickness([a, b], 0.2) - mean).abs() < 1e-4, "{a} {b}");
+        }
+    }
 
     #[test]
     fn the_layer_on_a_stair_takes_what_curved_layers_leave() {
