@@ -209,9 +209,8 @@ fn supports_of_curved_layers_begin_on_the_bed_and_carry_the_part() {
         assert!(matches!(scratch.run(&all).code, Some(0 | 1)));
         let report = std::fs::read(scratch.path("r.json")).unwrap();
         let report: Value = serde_json::from_slice(&report).unwrap();
-        // But for single beads beside the stem, where columns keep away, nothing hangs.
         let findings = report["verify"]["findings"].as_array().unwrap();
-        assert!(findings.len() <= 8, "{layers:?}: {findings:?}");
+        assert!(findings.is_empty(), "{layers:?}: {findings:?}");
         let text = std::fs::read_to_string(scratch.path("x.gcode")).unwrap();
         let all = motions(&text);
         let lowest = of(&all, BODY).map(|m| m.to[2]).fold(f64::INFINITY, f64::min);

@@ -7,7 +7,7 @@
 //! if only the bed may carry them, they are left out from the top down ([`columns`]).
 //!
 //! Supports keep a gap to the part: aside `xy_gap` mm, and above and below as many whole layers as
-//! it takes to be at least `top_gap` and `bottom_gap` mm. The layers of a column next to the part
+//! it takes to be at least nine tenths of `top_gap` and `bottom_gap` mm. The layers of a column next to the part
 //! are its *interface*, which is filled more densely.
 
 use geom::region::{Fill, Island, Region};
@@ -260,14 +260,22 @@ fn column(
         near = near.union(&layer.material);
     }
     let interface = opened(&whole.intersection(&near), radius);
+    if interface.is_empty() {
+        return Column { whole, ..Column::default() };
+    }
+    // What is left beside it holds lines only where it is wide enough for two of them; dense lines
+    // that end short of the edge would lie between the sheath and where the others end.
+    let body = opened(&whole.difference(&interface), params.spacing / 2.0);
+    let interface = opened(&whole.difference(&body), radius);
     Column { whole, interface, carried: Region::default() }
 }
 
 /// How many layers it takes to keep a gap, of these thicknesses in their order.
 fn gap(wanted: f64, thicknesses: impl Iterator<Item = f64>) -> usize {
-    /// Rounding of a sum of heights, mm.
-    const SLACK_MM: f64 = 1e-6;
-    let mut left = wanted - SLACK_MM;
+    /// What a gap may lack of what is wanted: layers are a little thinner than asked for where a
+    /// whole number of them has to fit, and one more would be too wide for beads to sag across.
+    const SLACK_SHARE: f64 = 0.1;
+    let mut left = wanted * (1.0 - SLACK_SHARE);
     let mut count = 0;
     for thickness in thicknesses {
         if left <= 0.0 {

@@ -107,6 +107,17 @@ fn columns_keep_their_gaps() {
     assert_eq!(last, Some(9), "three layers stay free for 0.5 mm");
 }
 
+#[test]
+fn a_gap_that_misses_by_a_hair_takes_no_further_layer() {
+    // Layers on a cone are a little thinner than asked for, where a whole number of them has to fit.
+    let mut layers = layers();
+    for layer in &mut layers {
+        layer.thickness = 0.199;
+    }
+    let last = columns_of(&layers, &PARAMS).iter().rposition(|c| has_support(c, [4.0, 0.0]));
+    assert_eq!(last, Some(11), "a layer stays free for 0.2 mm");
+}
+
 fn columns_of(layers: &[Shade], params: &SupportParams) -> Vec<Column> {
     columns(layers, params)
 }
