@@ -710,6 +710,8 @@ M84
 ; filament_min_volumetric_speed = 0.1
 ; retract_length = 0.8
 ; retract_speed = 35
+; deretract_speed = 0
+; retract_layer_change = 0
 ; retract_before_travel = 2
 ; retract_lift = 0.2
 ; wipe_distance = 0
@@ -742,10 +744,12 @@ M84
 ; external_perimeters_first = 0
 ; avoid_crossing_perimeters = 0
 ; only_one_perimeter_top = 0
+; only_one_perimeter_first_layer = 0
 ; extra_perimeters = 0
 ; spiral_vase = 0
 ; seam_position = nearest
 ; seam_angle = 90
+; first_layer_extrusion_width = 0
 ; external_perimeter_extrusion_width = 0.45
 ; perimeter_extrusion_width = 0.45
 ; infill_extrusion_width = 0.45
@@ -756,6 +760,9 @@ M84
 ; thin_width_max = 0.85
 ; top_solid_layers = 4
 ; bottom_solid_layers = 4
+; top_solid_min_thickness = 0
+; bottom_solid_min_thickness = 0
+; solid_infill_every_layers = 0
 ; fill_density = 15%
 ; fill_pattern = rectilinear
 ; solid_fill_pattern = rectilinear
@@ -779,9 +786,11 @@ M84
 ; skirts = 1
 ; skirt_distance = 6
 ; brim_width = 0
+; brim_type = outer_only
 ; brim_separation = 0.1
 ; external_perimeter_speed = 30
 ; perimeter_speed = 45
+; small_perimeter_speed = 0
 ; infill_speed = 60
 ; solid_infill_speed = 50
 ; top_solid_infill_speed = 35

@@ -20,6 +20,7 @@ mod curved;
 mod curved_walls;
 mod environment;
 mod golden;
+mod habits;
 mod house;
 mod interrupt;
 mod lens;

@@ -21,6 +21,8 @@ pub struct Speeds {
     pub external_perimeter: f64,
     /// Other walls.
     pub perimeter: f64,
+    /// Walls around little; 0 for no bound.
+    pub small_perimeter: f64,
     /// Sparse infill.
     pub infill: f64,
     /// Solid infill.
@@ -82,8 +84,12 @@ pub struct FilamentParams {
     pub least_flow: f64,
     /// Filament drawn back before a travel, mm; 0 for never.
     pub retract_length: f64,
-    /// Speed of drawing back and feeding again, mm/s.
+    /// Speed of drawing back, mm/s.
     pub retract_speed: f64,
+    /// Speed of feeding again, mm/s.
+    pub feed_speed: f64,
+    /// Whether filament is drawn back before every new layer.
+    pub retract_between_layers: bool,
     /// Travels shorter than this leave the filament alone, mm.
     pub retract_before_travel: f64,
     /// How far the nozzle is lifted while the filament is drawn back, mm.
@@ -231,6 +237,9 @@ impl Router {
             top: self.top,
             height: layer.thickness,
         })));
+        if filament.retract_between_layers && layer.index > 0 {
+            self.retract(filament);
+        }
         let mut last_island = None;
         // Combs of islands, made when they are wanted.
         let mut combs: Vec<Option<Comb>> = vec![None; layer.islands.len()];
@@ -319,7 +328,7 @@ impl Router {
             self.go_over(to, self.at.z.max(to.z).max(highest) + lift, speed);
         }
         if self.retracted {
-            self.stroke(Kind::Filament, to, filament.retract_length, filament.retract_speed);
+            self.stroke(Kind::Filament, to, filament.retract_length, filament.feed_speed);
             self.retracted = false;
         }
     }
@@ -449,7 +458,10 @@ impl Router {
         speeds: &Speeds,
         filament: &FilamentParams,
     ) {
-        let wanted = speeds.of(line.role, is_first_layer);
+        let mut wanted = speeds.of(line.role, is_first_layer);
+        if speeds.small_perimeter > 0.0 && is_small_wall(line) {
+            wanted = wanted.min(speeds.small_perimeter);
+        }
         let (mut told, mut told_hangs) = ((f64::NAN, None), false);
         let mut told_height: Option<f64> = None;
         let is_combined = line.role == Role::CombinedInfill;
@@ -495,6 +507,22 @@ impl Router {
         }
         self.last_line = line.stations.iter().map(|station| station.at).collect();
     }
+}
+
+/// Longer walls are none around little, mm: a circle of 6.5 mm radius.
+const SMALL_WALL_MM: f64 = 6.5 * std::f64::consts::TAU;
+
+/// Whether a line is a wall around little.
+fn is_small_wall(line: &OrderedLine) -> bool {
+    let is_closed = line.stations.first().map(|s| s.at) == line.stations.last().map(|s| s.at);
+    if !line.role.is_wall() || !(is_closed || line.slopes) {
+        return false;
+    }
+    let mut length = 0.0;
+    line.stations.windows(2).all(|pair| {
+        length += distance(&pair[0].at, &pair[1].at);
+        length <= SMALL_WALL_MM
+    })
 }
 
 /// Cuts a piece along which the bead changes so that each part can be laid with one width.
@@ -578,6 +606,7 @@ mod tests {
     const SPEEDS: Speeds = Speeds {
         external_perimeter: 30.0,
         perimeter: 45.0,
+        small_perimeter: 0.0,
         infill: 60.0,
         solid_infill: 50.0,
         top_solid_infill: 30.0,
@@ -597,6 +626,8 @@ mod tests {
         least_flow: 0.1,
         retract_length: 0.8,
         retract_speed: 35.0,
+        feed_speed: 20.0,
+        retract_between_layers: false,
         retract_before_travel: 2.0,
         retract_lift: 0.2,
         wipe: 0.0,

@@ -165,7 +165,8 @@ pub fn slice_all(
     let objects = Objects { outlines };
     let groups = groups(&placed, &turned, &arrangement.own, &job);
     let parts = Parts { all: &upright, groups: &groups, objects: &objects };
-    let mut printed = layers(&parts, &stages, &job, &mut text, watch)?;
+    let with = (&job, request.settings);
+    let mut printed = layers(&parts, &stages, with, &mut text, watch)?;
     for (_, island) in &mut printed.floating {
         island.at = turned.inverse() * island.at;
     }
@@ -232,7 +233,9 @@ fn time_of(
     let mut text =
         Emitter::for_printer(&mut nobody as &mut (dyn Write + Send), job.dialect, &job.printer);
     let parts = Parts { all: upright, groups: &[], objects: &Objects::default() };
-    Ok(layers(&parts, &stages, &job, &mut text, watch)?.totals.time)
+    job.at_layers = None;
+    let settings = Settings::defaults();
+    Ok(layers(&parts, &stages, (&job, &settings), &mut text, watch)?.totals.time)
 }
 
 /// The start program, and after it which objects there are, where there are several and they are told.
@@ -328,7 +331,7 @@ pub(crate) struct Parts<'a> {
 fn layers(
     parts: &Parts<'_>,
     stages: &[Stage],
-    job: &Job,
+    (job, settings): (&Job, &Settings),
     text: &mut Emitter<&mut (dyn Write + Send)>,
     watch: &mut Watch<'_>,
 ) -> Result<Printed, Failure> {
@@ -346,7 +349,8 @@ fn layers(
     }
     let count: usize = stages.iter().map(|stage| stage.printed.len()).sum();
     watch.progress.stage("slice", count as u64);
-    let mut printing = Printing { stages, job, planner, text, progress: watch.progress, printed };
+    let progress = &mut *watch.progress;
+    let mut printing = Printing { stages, job, settings, planner, text, progress, printed };
     let mut filling = Filling::new(parts, stages, &columns, job, watch.interrupt);
     let mut filled = filling.next().transpose()?;
     while let Some(batch) = filled {
@@ -371,6 +375,7 @@ fn layers(
 struct Printing<'a, 't, 'o> {
     stages: &'a [Stage],
     job: &'a Job,
+    settings: &'a Settings,
     planner: Planner<'a>,
     text: &'t mut Emitter<&'o mut (dyn Write + Send)>,
     progress: &'t mut dyn Progress,
@@ -408,7 +413,24 @@ impl Printing<'_, '_, '_> {
             let steps = self.planner.layer_on(&filled.paths, normal).map_err(|error| {
                 Failure::new("OutOfEnvelope", error.to_string()).hint(out_of_reach(self.job))
             })?;
-            write(self.text, &steps)?;
+            self.write(&steps)?;
+        }
+        Ok(())
+    }
+
+    /// Writes a layer, with what the printer wants to be told at each.
+    fn write(&mut self, steps: &[Step]) -> Result<(), Failure> {
+        let Some(programs) = &self.job.at_layers else { return write(self.text, steps) };
+        for step in steps {
+            let Step::Layer(layer) = step else {
+                write(self.text, std::slice::from_ref(step))?;
+                continue;
+            };
+            let [before, after] = programs.of(layer.index, layer.top, self.settings)?;
+            let before = before.into_iter().map(Step::Custom);
+            let after = after.into_iter().map(Step::Custom);
+            let all: Vec<Step> = before.chain([step.clone()]).chain(after).collect();
+            write(self.text, &all)?;
         }
         Ok(())
     }

@@ -14,7 +14,7 @@ use slicer::chart::{Chart, carried, carried_point, carried_to_side};
 use slicer::compensation::{CompensationParams, compensated};
 use slicer::infill::Pattern;
 use slicer::infill::lightning::{Branches, Stratum, grow};
-use slicer::layer::{Filled, Parted};
+use slicer::layer::{Filled, Parted, PathParams};
 use slicer::level::Level;
 use slicer::lift::Lift;
 use slicer::section::{Cutter, Section, Tears};
@@ -111,7 +111,8 @@ impl<'a> Stack<'a> {
             interrupt.check()?;
             let window = from..(from + WINDOW).min(end);
             ahead.reach(&window, |_| {});
-            let core = |k| ahead.part(k).map(|layer| layer.core(params)).unwrap_or_default();
+            let core =
+                |k| ahead.part(k).map(|layer| layer.core(&ahead.params(k))).unwrap_or_default();
             cores.par_extend(window.into_par_iter().map(core));
         }
         let strata = (0..cores.len()).into_par_iter().map(|i| {
@@ -242,20 +243,23 @@ impl<'a> Stack<'a> {
 
     /// Fills the layers of a window.
     pub(crate) fn fill(&self, window: Range<usize>) -> Vec<Filled> {
-        let params = &self.job.paths;
         if self.job.paths.infill.every <= 1 {
             let runs: Vec<Vec<Filled>> =
                 self.runs(window).into_par_iter().map(|run| self.fill_run(run)).collect();
             return runs.into_iter().flatten().collect();
         }
+        let start = window.start;
         let parted = window.clone().into_par_iter().map(|k| self.part(k));
         let mut parted: Vec<Option<Parted<'_>>> = parted.collect();
         for (index, group) in self.combined(&window) {
             let layers = &mut parted[group.start - window.start..group.end - window.start];
             self.combine(layers, group, index);
         }
-        let filled = parted.into_par_iter();
-        filled.map(|layer| layer.map(|layer| layer.fill(params)).unwrap_or_default()).collect()
+        let filled = parted.into_par_iter().enumerate();
+        let fill = |(i, layer): (usize, Option<Parted<'_>>)| {
+            layer.map(|layer| layer.fill(&self.params(start + i))).unwrap_or_default()
+        };
+        filled.map(fill).collect()
     }
 
     /// The groups of layers of a window whose sparse infill is laid at once: as many as are wanted, or as
@@ -329,17 +333,17 @@ impl<'a> Stack<'a> {
 
     /// Fills layers of which each repeats the one before: they are taken apart once.
     fn fill_run(&self, run: Range<usize>) -> Vec<Filled> {
-        let params = &self.job.paths;
+        let params = self.params(run.start);
         let Some(first) = self.part(run.start) else {
             return run.map(|_| Filled::default()).collect();
         };
         let fill = |k: usize| {
             let again = first.again_on(&self.lift(k)).map(|layer| self.branched(layer, k));
             let layer = again.or_else(|| self.part(k));
-            layer.map(|layer| layer.fill(params)).unwrap_or_default()
+            layer.map(|layer| layer.fill(&self.params(k))).unwrap_or_default()
         };
         let rest: Vec<Filled> = (run.start + 1..run.end).into_par_iter().map(fill).collect();
-        std::iter::once(first.fill(params)).chain(rest).collect()
+        std::iter::once(first.fill(&params)).chain(rest).collect()
     }
 
     /// The layers of a window, in runs of such as are the same but for their height.
@@ -363,7 +367,14 @@ impl<'a> Stack<'a> {
         let lowest = below.last().copied().unwrap_or(k);
         let highest = above.last().copied().unwrap_or(k);
         (above.len(), below.len()) == (others_above.len(), others_below.len())
+            && self.params(k) == self.params(k - 1)
             && (lowest..=highest).all(|i| self.sections[i - self.first].repeats)
+    }
+
+    /// How a layer is filled.
+    fn params(&self, k: usize) -> PathParams {
+        let index = self.stage.levels[k].index;
+        self.job.paths.of_layer(index, index == 0 && self.stage.floor.is_none())
     }
 
     /// Takes a layer apart; `None` where nothing of it is.
@@ -384,7 +395,7 @@ impl<'a> Stack<'a> {
             below: below.iter().map(AsRef::as_ref).collect(),
             support,
         };
-        let parted = Parted::new(&lift, &material, &neighbours, &self.job.paths).on(support);
+        let parted = Parted::new(&lift, &material, &neighbours, &self.params(k)).on(support);
         Some(self.branched(parted, k))
     }
 
@@ -509,7 +520,8 @@ mod tests {
             let mut stack = Stack::new(&solid, &stages[0], None, &job);
             let window = stages[0].printed.clone();
             stack.reach(&window, |_| {});
-            let alone = |k| stack.part(k).map(|layer| layer.fill(&job.paths)).unwrap_or_default();
+            let alone =
+                |k| stack.part(k).map(|layer| layer.fill(&stack.params(k))).unwrap_or_default();
             let each: Vec<Filled> = window.clone().map(alone).collect();
             let repeated = window.clone().filter(|k| *k > 0 && stack.repeats(*k)).count();
             assert!(repeated >= least, "{model}: {repeated} of {} layers", window.len());

@@ -17,6 +17,10 @@ pub struct AdhesionParams {
     pub skirt_distance: f64,
     /// Width of the brim, mm; 0 for none.
     pub brim_width: f64,
+    /// Whether the brim lies around the part.
+    pub brim_outside: bool,
+    /// Whether it lies in the holes of the part.
+    pub brim_inside: bool,
     /// Gap between brim and part, mm.
     pub brim_separation: f64,
     /// No loop reaches farther than this from the rotation axis, mm.
@@ -43,12 +47,18 @@ pub fn around(first_layer: &Region, width: f64, spacing: f64, params: &AdhesionP
     let brim_loops = (params.brim_width / spacing).round() as usize;
     // Islands of the part keep their holes free of brim: only outer borders are followed.
     let filled = outer_borders(first_layer);
-    for k in 0..brim_loops {
-        let distance = params.brim_separation + width / 2.0 + spacing * k as f64;
-        outwards.extend(rings(&outer_borders(&filled.outset(distance))));
+    let distance = |k: usize| params.brim_separation + width / 2.0 + spacing * k as f64;
+    if params.brim_inside {
+        let holes = filled.difference(first_layer);
+        let loops = (0..brim_loops).map(|k| holes.inset(distance(k)));
+        outwards.extend(loops.flat_map(|region| rings(&region).collect::<Vec<_>>()));
     }
-    let brim_edge =
-        params.brim_separation * f64::from(u8::from(brim_loops > 0)) + spacing * brim_loops as f64;
+    let outer_loops = if params.brim_outside { brim_loops } else { 0 };
+    for k in 0..outer_loops {
+        outwards.extend(rings(&outer_borders(&filled.outset(distance(k)))));
+    }
+    let brim_edge = params.brim_separation * f64::from(u8::from(outer_loops > 0))
+        + spacing * outer_loops as f64;
     let hull = hull_of(&filled);
     for k in 0..params.skirts {
         let distance = brim_edge + params.skirt_distance + width / 2.0 + spacing * k as f64;
@@ -87,6 +97,8 @@ mod tests {
         skirts: 2,
         skirt_distance: 6.0,
         brim_width: 0.0,
+        brim_outside: true,
+        brim_inside: false,
         brim_separation: 0.1,
         reach: 100.0,
     };
@@ -114,6 +126,23 @@ mod tests {
         let innermost = adhesion.loops.last().unwrap();
         let gap = -innermost.iter().map(|p| p.x).fold(f64::INFINITY, f64::min) - 0.225;
         assert!((gap - 0.1).abs() < 1e-4, "{gap}");
+    }
+
+    #[test]
+    fn a_brim_may_lie_in_holes() {
+        let ring =
+            rectangle(-20.0, -20.0, 40.0, 40.0).difference(&rectangle(-8.0, -8.0, 16.0, 16.0));
+        let reach = |params: &AdhesionParams| -> Vec<f64> {
+            let loops = around(&ring, 0.45, 0.4, params).loops;
+            loops.iter().map(|l| l.iter().map(|p| p.x).fold(0.0, f64::max)).collect()
+        };
+        let inside = AdhesionParams { skirts: 0, brim_width: 2.0, brim_inside: true, ..PARAMS };
+        let both = reach(&inside);
+        assert_eq!(both.len(), 10);
+        let inner: Vec<&f64> = both.iter().filter(|x| **x < 8.0).collect();
+        assert_eq!(inner.len(), 5);
+        assert!(inner.iter().all(|x| (5.9..7.7).contains(*x)), "{inner:?}");
+        assert!(reach(&AdhesionParams { brim_outside: false, ..inside }).iter().all(|x| *x < 8.0));
     }
 
     #[test]

@@ -37,6 +37,8 @@ pub struct PathParams {
     pub skins: SkinParams,
     /// Lines inside.
     pub infill: InfillParams,
+    /// What is different on the bed.
+    pub first_layer: FirstLayerParams,
     /// Loops around the first layer.
     pub adhesion: AdhesionParams,
     /// How far outlines move before all that.
@@ -49,6 +51,37 @@ pub struct PathParams {
     pub vase: bool,
     /// How far simplified lines may lie from their course, mm.
     pub tolerance: f64,
+}
+
+/// What is different on the bed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FirstLayerParams {
+    /// Width of all its lines, mm; `None` for that of the other layers.
+    pub width: Option<f64>,
+    /// Whether it has a single wall.
+    pub one_wall: bool,
+}
+
+impl PathParams {
+    /// Returns what holds for a layer: counted from the bed, whether it lies on it.
+    #[must_use]
+    pub fn of_layer(&self, index: usize, on_bed: bool) -> Self {
+        let mut own = *self;
+        let every = self.skins.solid_every;
+        own.skins.all_solid |= every > 0 && index.is_multiple_of(every);
+        if !on_bed {
+            return own;
+        }
+        if self.first_layer.one_wall {
+            own.walls.count = own.walls.count.min(1);
+        }
+        if let Some(width) = self.first_layer.width {
+            (own.walls.external_width, own.walls.width) = (width, width);
+            (own.infill.width, own.infill.solid_width) = (width, width);
+            own.infill.top_width = width;
+        }
+        own
+    }
 }
 
 /// What one layer is made of, and a remark on what did not fit.

@@ -23,6 +23,8 @@ pub struct SkinParams {
     pub solid_below_area: f64,
     /// Whether everything is solid.
     pub all_solid: bool,
+    /// One layer of this many is solid throughout; 0 for none.
+    pub solid_every: usize,
 }
 
 /// An interior taken apart.
@@ -163,8 +165,13 @@ mod tests {
     use geom::region::Fill;
     use nalgebra::Point2;
 
-    const PARAMS: SkinParams =
-        SkinParams { top_layers: 3, bottom_layers: 2, solid_below_area: 0.0, all_solid: false };
+    const PARAMS: SkinParams = SkinParams {
+        top_layers: 3,
+        bottom_layers: 2,
+        solid_below_area: 0.0,
+        all_solid: false,
+        solid_every: 0,
+    };
 
     fn square(size: f64) -> Region {
         let half = size / 2.0;

@@ -290,6 +290,7 @@ fn own_settings(arguments: &Slice, settings: &Settings) -> Result<Vec<Own>, Fail
         // What does not lie in an object alone is the same for all.
         let same = PathParams {
             adhesion: common.paths.adhesion,
+            first_layer: common.paths.first_layer,
             vase: common.paths.vase,
             tolerance: common.paths.tolerance,
             ..paths

@@ -7,7 +7,7 @@ use super::prusa::{self, Imported};
 use crate::failure::Failure;
 
 /// What keys of OrcaSlicer are called in PrusaSlicer, where they mean the same.
-const NAMES: [(&str, &str); 54] = [
+const NAMES: [(&str, &str); 59] = [
     ("initial_layer_print_height", "first_layer_height"),
     ("wall_loops", "perimeters"),
     ("outer_wall_line_width", "external_perimeter_extrusion_width"),
@@ -17,6 +17,11 @@ const NAMES: [(&str, &str); 54] = [
     ("top_surface_line_width", "top_infill_extrusion_width"),
     ("support_line_width", "support_material_extrusion_width"),
     ("line_width", "extrusion_width"),
+    ("initial_layer_line_width", "first_layer_extrusion_width"),
+    ("only_one_wall_first_layer", "only_one_perimeter_first_layer"),
+    ("top_shell_thickness", "top_solid_min_thickness"),
+    ("bottom_shell_thickness", "bottom_solid_min_thickness"),
+    ("small_perimeter_speed", "small_perimeter_speed"),
     ("top_shell_layers", "top_solid_layers"),
     ("bottom_shell_layers", "bottom_solid_layers"),
     ("sparse_infill_density", "fill_density"),

@@ -38,7 +38,9 @@ const OTHER_NAMES: [(&str, &str); 8] = [
 const OTHER_MEANINGS: [&str; 1] = ["gcode_resolution"];
 
 /// What a percentage is of; of itself, the other names say.
-const SHARES_OF: [(&str, &str); 14] = [
+const SHARES_OF: [(&str, &str); 16] = [
+    ("first_layer_extrusion_width", "first_layer_height"),
+    ("small_perimeter_speed", "perimeter_speed"),
     ("first_layer_height", "layer_height"),
     ("external_perimeter_speed", "perimeter_speed"),
     ("first_layer_speed", "perimeter_speed"),

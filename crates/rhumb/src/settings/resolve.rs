@@ -25,7 +25,7 @@ use slicer::clearance::{LayerOrder, NozzleProfile, Uphill};
 use slicer::compensation::CompensationParams;
 use slicer::fuzzy::FuzzyParams;
 use slicer::infill::{InfillParams, IroningParams, Pattern, SolidPattern};
-use slicer::layer::PathParams;
+use slicer::layer::{FirstLayerParams, PathParams};
 use slicer::level::adaptive::AdaptiveParams;
 use slicer::level::{ScheduleParams, Snap};
 use slicer::skins::SkinParams;
@@ -38,6 +38,7 @@ use twin::motor::lag::BedDrive;
 use super::head;
 use super::key::{Key, Value};
 use super::merge::Settings;
+use super::template::AtLayers;
 use super::{surface, template};
 use crate::failure::Failure;
 use crate::ranges::Span;
@@ -98,6 +99,8 @@ pub struct Job {
     pub start: Vec<String>,
     /// Program after the print.
     pub end: Vec<String>,
+    /// Programs at every layer, if there are any.
+    pub at_layers: Option<AtLayers>,
 }
 
 /// Most cuts of a facet by a layer unless the user says: minutes of work. A detailed scan of a million
@@ -169,6 +172,7 @@ impl Job {
             most_cuts: MOST_CUTS,
             start: start(&get, &dialect, settings)?,
             end: template::fill(get.text("end_gcode"), "end_gcode", settings)?,
+            at_layers: at_layers(&get, settings)?,
             printer,
             dialect,
         })
@@ -365,7 +369,8 @@ const WIDTHS: [&str; 5] = [
 fn widths(get: &Lookup<'_>) -> impl Iterator<Item = (&'static str, f64)> {
     let support = Some("support_material_extrusion_width_mm");
     let support = support.filter(|_| get.switch("support_material"));
-    WIDTHS.into_iter().chain(support).map(|name| (name, get.number(name)))
+    let first = Some("first_layer_extrusion_width_mm").filter(|name| get.number(name) > 0.0);
+    WIDTHS.into_iter().chain(support).chain(first).map(|name| (name, get.number(name)))
 }
 
 fn schedule(get: &Lookup<'_>) -> Result<ScheduleParams, Failure> {
@@ -434,10 +439,15 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
             greatest_width: get.number("thin_width_max_mm"),
         },
         skins: SkinParams {
-            top_layers: get.count("top_solid_layers"),
-            bottom_layers: get.count("bottom_solid_layers"),
+            top_layers: solid_layers(get, "top"),
+            bottom_layers: solid_layers(get, "bottom"),
             solid_below_area: get.number("solid_infill_below_area_mm2"),
             all_solid: density >= 1.0,
+            solid_every: get.count("solid_infill_every_layers"),
+        },
+        first_layer: FirstLayerParams {
+            width: Some(get.number("first_layer_extrusion_width_mm")).filter(|width| *width > 0.0),
+            one_wall: get.switch("only_one_perimeter_first_layer"),
         },
         infill: InfillParams {
             density,
@@ -467,6 +477,8 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
             skirts: get.count("skirts"),
             skirt_distance: get.number("skirt_distance_mm"),
             brim_width: get.number("brim_width_mm"),
+            brim_outside: matches!(get.text("brim_type"), "outer_only" | "outer_and_inner"),
+            brim_inside: matches!(get.text("brim_type"), "inner_only" | "outer_and_inner"),
             brim_separation: get.number("brim_separation_mm"),
             reach: printer.rail.max,
         },
@@ -483,6 +495,16 @@ fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances) -> PathPa
         vase: get.switch("spiral_vase"),
         tolerance: tolerances.simplify_mm(),
     }
+}
+
+/// How many solid layers there are at least on this side of the part.
+fn solid_layers(get: &Lookup<'_>, side: &str) -> usize {
+    /// Rounding of a thickness given in decimals, layers.
+    const SLACK: f64 = 1e-6;
+    let count = get.count(&format!("{side}_solid_layers"));
+    let thickness = get.number(&format!("{side}_solid_min_thickness_mm"));
+    let needed = (thickness / get.number("layer_height_mm") - SLACK).ceil().max(0.0) as usize;
+    if count == 0 { 0 } else { count.max(needed) }
 }
 
 /// How parts are supported, if they are.
@@ -560,6 +582,17 @@ fn start(get: &Lookup<'_>, dialect: &Dialect, settings: &Settings) -> Result<Vec
     Ok(lines)
 }
 
+/// The programs at every layer, where there are any; what cannot be filled in is found here.
+fn at_layers(get: &Lookup<'_>, settings: &Settings) -> Result<Option<AtLayers>, Failure> {
+    let [before, after] = ["before_layer_gcode", "layer_gcode"].map(|name| get.text(name));
+    if before.is_empty() && after.is_empty() {
+        return Ok(None);
+    }
+    let programs = AtLayers { before: before.to_owned(), after: after.to_owned() };
+    programs.of(0, 0.0, settings)?;
+    Ok(Some(programs))
+}
+
 /// How far combed travel keeps from outlines, as a share of the width of the outermost bead.
 const COMB_SHARE: f64 = 0.4;
 
@@ -582,6 +615,7 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
         speeds: Speeds {
             external_perimeter: get.number("external_perimeter_speed_mm_per_s"),
             perimeter: get.number("perimeter_speed_mm_per_s"),
+            small_perimeter: get.number("small_perimeter_speed_mm_per_s"),
             infill: get.number("infill_speed_mm_per_s"),
             solid_infill: get.number("solid_infill_speed_mm_per_s"),
             top_solid_infill: get.number("top_solid_infill_speed_mm_per_s"),
@@ -603,6 +637,11 @@ fn plan(get: &Lookup<'_>, dialect: Dialect, tolerances: &Tolerances) -> PlanPara
             least_flow: get.number("min_volumetric_speed_mm3_per_s"),
             retract_length: get.number("retract_length_mm"),
             retract_speed: get.number("retract_speed_mm_per_s"),
+            feed_speed: match get.number("deretract_speed_mm_per_s") {
+                0.0 => get.number("retract_speed_mm_per_s"),
+                speed => speed,
+            },
+            retract_between_layers: get.switch("retract_layer_change"),
             retract_before_travel: get.number("retract_before_travel_mm"),
             retract_lift: get.number("retract_lift_mm"),
             wipe: get.number("wipe_mm"),

@@ -22,7 +22,47 @@ use crate::failure::Failure;
 /// `ConfigSyntax` for a brace without its partner or an expression that is none,
 /// `ConfigUnknownKey` for a name that is none.
 pub fn fill(program: &str, name: &str, settings: &Settings) -> Result<Vec<String>, Failure> {
-    let names = OfSettings(settings);
+    fill_with(program, name, settings, &[])
+}
+
+/// Programs that stand at every layer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AtLayers {
+    /// Before the layer is announced.
+    pub before: String,
+    /// After it is.
+    pub after: String,
+}
+
+impl AtLayers {
+    /// Returns the lines before and after a layer is announced: its number, counted from 0, and how
+    /// high the print then stands, mm.
+    ///
+    /// # Errors
+    ///
+    /// As [`fill`].
+    pub fn of(
+        &self,
+        number: usize,
+        z: f64,
+        settings: &Settings,
+    ) -> Result<[Vec<String>; 2], Failure> {
+        let numbers = [("layer_num", number as f64), ("layer_z", z)];
+        Ok([
+            fill_with(&self.before, "before_layer_gcode", settings, &numbers)?,
+            fill_with(&self.after, "layer_gcode", settings, &numbers)?,
+        ])
+    }
+}
+
+/// Like [`fill`], with numbers that are no settings.
+fn fill_with(
+    program: &str,
+    name: &str,
+    settings: &Settings,
+    numbers: &[(&str, f64)],
+) -> Result<Vec<String>, Failure> {
+    let names = OfSettings(settings, numbers);
     // A printer takes a carriage return for the end of a line: what follows is no part of a comment.
     let program = &program.replace("\r\n", "\n").replace('\r', "\n");
     let mut filler = Filler { names: &names, branches: Vec::new(), filled: String::new() };
@@ -162,10 +202,13 @@ fn stray(word: &str) -> Fault {
     Fault::Syntax(format!("{word} without an if"))
 }
 
-struct OfSettings<'a>(&'a Settings);
+struct OfSettings<'a>(&'a Settings, &'a [(&'a str, f64)]);
 
 impl Names for OfSettings<'_> {
     fn get(&self, name: &str) -> Option<Worth> {
+        if let Some((_, number)) = self.1.iter().find(|(other, _)| *other == name) {
+            return Some(Worth::Number(*number));
+        }
         // A program inside a program would be filled in without end.
         let is_program = |name: &str| name.ends_with("_gcode");
         let key = KEYS.iter().find(|key| {
@@ -200,6 +243,20 @@ mod tests {
             ["M104 S210 ; PLA [not a name] [1]"]
         );
         assert!(filled("").is_empty());
+    }
+
+    #[test]
+    fn programs_at_layers_know_their_layer() {
+        let after = "{if layer_num % 2 == 1}M117 Layer [layer_num] at {layer_z}{endif}".to_owned();
+        let programs = AtLayers { before: "; before {layer_z}".to_owned(), after };
+        let settings = Settings::defaults();
+        let [before, after] = programs.of(3, 0.8, &settings).unwrap();
+        assert_eq!(
+            (before, after),
+            (vec!["; before 0.8".into()], vec!["M117 Layer 3 at 0.8".into()])
+        );
+        assert!(programs.of(2, 0.6, &settings).unwrap()[1].is_empty());
+        assert!(fill("{layer_num}", "start_gcode", &settings).is_err());
     }
 
     #[test]

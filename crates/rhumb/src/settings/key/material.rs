@@ -1,6 +1,6 @@
 //! The settings of a material: what a filament needs.
 
-use super::{Key, Section, count, number, share, text};
+use super::{Key, Kind, Section, count, number, share, text};
 use Section::Material;
 
 /// In the order in which they are shown.
@@ -70,8 +70,23 @@ pub(super) const KEYS: &[Key] = &[
         "retract_speed_mm_per_s",
         "retract_speed",
         (35.0, 1.0, 200.0),
-        "speed of drawing back and feeding again",
+        "speed of drawing back, and of feeding again",
     ),
+    number(
+        Material,
+        "deretract_speed_mm_per_s",
+        "deretract_speed",
+        (0.0, 0.0, 200.0),
+        "speed of feeding again; 0 for that of drawing back",
+    ),
+    Key {
+        name: "retract_layer_change",
+        section: Material,
+        kind: Kind::Switch,
+        default: super::Default::Switch(false),
+        program_name: "retract_layer_change",
+        meaning: "whether filament is drawn back before every new layer, however near it begins",
+    },
     number(
         Material,
         "retract_before_travel_mm",

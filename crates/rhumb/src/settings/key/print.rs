@@ -175,6 +175,14 @@ pub(super) const KEYS: &[Key] = &[
         meaning: "whether islands with nothing above have a single wall, and more of the top pattern",
     },
     Key {
+        name: "only_one_perimeter_first_layer",
+        section: Print,
+        kind: Kind::Switch,
+        default: Default::Switch(false),
+        program_name: "only_one_perimeter_first_layer",
+        meaning: "whether the first layer has a single wall, and more of the bottom's lines",
+    },
+    Key {
         name: "extra_perimeters",
         section: Print,
         kind: Kind::Switch,
@@ -205,6 +213,14 @@ pub(super) const KEYS: &[Key] = &[
         "seam_angle",
         (90.0, -360.0, 360.0),
         "direction of the seams with seam_position = rear, on the bed from its x axis",
+    ),
+    number(
+        Print,
+        "first_layer_extrusion_width_mm",
+        "first_layer_extrusion_width",
+        (0.0, 0.0, 5.0),
+        "width of all lines of the part, skirt and brim on the first layer; 0 for the widths of the \
+         other layers",
     ),
     number(
         Print,
@@ -267,6 +283,27 @@ pub(super) const KEYS: &[Key] = &[
         "bottom_solid_layers",
         (4, 0, 1000),
         "solid layers over a surface that is seen from below",
+    ),
+    number(
+        Print,
+        "top_solid_min_thickness_mm",
+        "top_solid_min_thickness",
+        (0.0, 0.0, 1000.0),
+        "solid layers under a surface that is seen from above are as many more as it takes to be at \
+         least as thick as this, in layers of layer_height_mm; none where top_solid_layers is 0",
+    ),
+    number(
+        Print,
+        "bottom_solid_min_thickness_mm",
+        "bottom_solid_min_thickness",
+        (0.0, 0.0, 1000.0),
+        "the same over a surface that is seen from below",
+    ),
+    count(
+        Print,
+        "solid_infill_every_layers",
+        (0, 0, 10_000),
+        "one layer of this many is solid throughout; 0 for none",
     ),
     share(Print, "fill_density", 0.15, "share of the inside that is filled"),
     choice(
@@ -415,6 +452,12 @@ pub(super) const KEYS: &[Key] = &[
         (0.0, 0.0, 200.0),
         "width of the brim; 0 for none",
     ),
+    choice(
+        Print,
+        "brim_type",
+        &["outer_only", "inner_only", "outer_and_inner", "no_brim"],
+        "where the brim lies: around the part, in its holes, both, or nowhere",
+    ),
     number(
         Print,
         "brim_separation_mm",
@@ -435,6 +478,14 @@ pub(super) const KEYS: &[Key] = &[
         "perimeter_speed",
         (45.0, 0.1, 1000.0),
         "speed of the other walls",
+    ),
+    number(
+        Print,
+        "small_perimeter_speed_mm_per_s",
+        "small_perimeter_speed",
+        (0.0, 0.0, 1000.0),
+        "highest speed of walls no longer than a circle of 6.5 mm radius: small holes and pins; 0 for \
+         that of other walls",
     ),
     number(
         Print,

@@ -468,5 +468,13 @@ pub(super) const KEYS: &[Key] = &[
         "G28\nM190 S{first_layer_bed_temperature}\nM109 S{first_layer_temperature}",
         "program before the print; names in braces are filled in",
     ),
+    text(
+        Printer,
+        "before_layer_gcode",
+        "",
+        "",
+        "program before every layer; layer_num (from 0) and layer_z can be filled in, too",
+    ),
+    text(Printer, "layer_gcode", "", "", "the same after the begin of every layer has been told"),
     text(Printer, "end_gcode", "", "M104 S0\nM140 S0\nM107\nM84", "program after the print"),
 ];
