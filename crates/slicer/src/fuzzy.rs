@@ -17,12 +17,19 @@ pub struct FuzzyParams {
     pub step: f64,
 }
 
-/// Roughens a closed line with the material on its left.
+/// How far the two sides of a thin place stay apart at least, as a share of the depth: walls of 1.2 mm
+/// are rough, too, and tips that taper to nothing are not.
+pub(crate) const APART_SHARE: f64 = 0.4;
+
+/// Roughens a closed line with the material on its left. It stays where it is where `room`, the places
+/// between the sides of the line, does not have the one twice as deep as it may go: there the other side
+/// is too near.
 #[must_use]
 pub fn roughened(
     line: &[(Point2<f64>, Bead)],
     layer: usize,
     params: &FuzzyParams,
+    room: impl Fn(&Point2<f64>) -> bool,
 ) -> Vec<(Point2<f64>, Bead)> {
     let Some(&(first, _)) = line.first() else { return Vec::new() };
     let seed = (layer as u64) << 40 ^ (first.x * 1e3).to_bits() ^ (first.y * 1e3).to_bits() << 7;
@@ -47,15 +54,27 @@ pub fn roughened(
                 thickness: bead.thickness + (to_bead.thickness - bead.thickness) * share,
             };
             depth = params.depth * random.next();
-            rough.push((from + side * share + inwards * depth, bead));
+            let at = from + side * share;
+            if !room(&(at + inwards * (2.0 * params.depth))) {
+                depth = 0.0;
+            }
+            rough.push((at + inwards * depth, bead));
             // Half to one and a half steps.
             along += params.step * (0.5 + random.next());
         }
         left = along - length;
         // A side of the wall would cut a hollow corner, outside of the part.
         let next = line[(k + 2) % line.len()].0;
+        let is_narrow = || {
+            let ahead = side / length;
+            !room(&(to + (inwards * 2.0 - ahead * 0.5) * params.depth))
+        };
         if side.perp(&(next - to)) < 0.0 {
-            rough.push((to + inwards * depth, *to_bead));
+            let is_free = room(&(to + inwards * (2.0 * params.depth)));
+            rough.push((to + inwards * if is_free { depth } else { 0.0 }, *to_bead));
+        } else if is_narrow() {
+            // A tip that is cut off would have its sides lie on each other.
+            rough.push((*to, *to_bead));
         }
     }
     // A line too short for it stays as it is.
@@ -86,7 +105,7 @@ mod tests {
         let corners = [[0.0, 0.0], [0.0, 6.0], [6.0, 6.0], [6.0, 0.0]];
         let line = corners.map(|p| (Point2::from(p), bead));
         for layer in 1..40 {
-            let rough = roughened(&line, layer, &FuzzyParams { depth: 0.3, step: 0.8 });
+            let rough = roughened(&line, layer, &FuzzyParams { depth: 0.3, step: 0.8 }, |_| true);
             for (k, (a, _)) in rough.iter().enumerate() {
                 let (b, _) = rough[(k + 1) % rough.len()];
                 for share in [0.0, 0.25, 0.5, 0.75] {
@@ -104,14 +123,32 @@ mod tests {
         let corners = [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]];
         let line = corners.map(|p| (Point2::from(p), bead));
         let params = FuzzyParams { depth: 0.3, step: 0.8 };
-        let rough = roughened(&line, 7, &params);
+        let rough = roughened(&line, 7, &params, |_| true);
         assert!((85..115).contains(&rough.len()), "{} points", rough.len());
         let depths: Vec<f64> =
             rough.iter().map(|(p, _)| p.x.min(p.y).min(20.0 - p.x).min(20.0 - p.y)).collect();
         assert!(depths.iter().all(|d| (-1e-9..0.3 + 1e-9).contains(d)));
         let mean = depths.iter().sum::<f64>() / depths.len() as f64;
         assert!((0.1..0.2).contains(&mean), "{mean}");
-        assert_eq!(roughened(&line, 7, &params), rough);
-        assert_ne!(roughened(&line, 8, &params), rough);
+        assert_eq!(roughened(&line, 7, &params, |_| true), rough);
+        assert_ne!(roughened(&line, 8, &params, |_| true), rough);
+    }
+
+    #[test]
+    fn slender_tips_stay_as_they_are() {
+        // A wedge of 3 mm that ends in 20 mm, and its wall: what lies between its sides is material.
+        let bead = Bead { width: 0.45, thickness: 0.2 };
+        let corners = [[0.0, 0.0], [20.0, 1.5], [0.0, 3.0]];
+        let line = corners.map(|p| (Point2::from(p), bead));
+        let room = |p: &Point2<f64>| p.x > 0.0 && (p.y - 1.5).abs() < 1.5 * (1.0 - p.x / 20.0);
+        for layer in 1..40 {
+            let rough = roughened(&line, layer, &FuzzyParams { depth: 0.3, step: 0.8 }, room);
+            assert!(rough.iter().any(|(p, _)| *p == Point2::new(20.0, 1.5)), "layer {layer}");
+            for (p, _) in rough.iter().filter(|(p, _)| p.x > 16.5) {
+                let off = 1.5 * (1.0 - p.x / 20.0) - (p.y - 1.5).abs();
+                assert!(off.abs() < 1e-9, "layer {layer}: {p}");
+            }
+            assert!(rough.iter().any(|(p, _)| p.x < 8.0 && p.y > 0.1 && p.y < 2.9));
+        }
     }
 }

@@ -13,7 +13,7 @@ use crate::bead::Bead;
 use crate::bridge::{Bridge, bridges};
 use crate::chart::Chart;
 use crate::compensation::CompensationParams;
-use crate::fuzzy::{FuzzyParams, roughened};
+use crate::fuzzy::{self, FuzzyParams, roughened};
 use crate::hanging::Below;
 use crate::infill;
 use crate::infill::ironing::ironing;
@@ -493,11 +493,17 @@ fn fill_island(
     for place in walls.thin.iter().chain(&gaps) {
         fills.extend(single_beads(place, frame, params, &mut lost));
     }
+    let rough = params.fuzzy.filter(|_| index > 0);
+    let room = rough.map(|how| {
+        let between = params.walls.external_width / 2.0 + fuzzy::APART_SHARE * how.depth;
+        frame.chart.inset(outline, between)
+    });
     let groups = walls.groups.iter().map(|group| {
         let loops = group.iter().map(|wall| {
             let role = if wall.depth == 0 { Role::ExternalPerimeter } else { Role::Perimeter };
-            let rough = params.fuzzy.filter(|_| wall.depth == 0 && index > 0);
-            let points = rough.map(|how| roughened(&wall.points, index, &how));
+            let rough = rough.zip(room.as_ref()).filter(|_| wall.depth == 0);
+            let points =
+                rough.map(|(how, room)| roughened(&wall.points, index, &how, |p| room.contains(p)));
             let points = points.as_ref().unwrap_or(&wall.points);
             let stations = if hanging.is_open() {
                 frame.lift.hanging_stations(&hanging.along(points))

@@ -79,7 +79,10 @@ mod tests {
             let mut radii: Vec<f64> = loops.iter().map(|l| l[0].coords.norm()).collect();
             radii.sort_by(f64::total_cmp);
             assert!(radii.windows(2).all(|pair| pair[1] - pair[0] > 0.39), "{hole}: {radii:?}");
-            assert!(radii.iter().any(|r| (2.5..3.5).contains(r)) || hole >= 0.7, "{hole}: {radii:?}");
+            assert!(
+                radii.iter().any(|r| (2.5..3.5).contains(r)) || hole >= 0.7,
+                "{hole}: {radii:?}"
+            );
         }
     }
 }
