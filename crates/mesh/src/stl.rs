@@ -19,6 +19,7 @@ use crate::mesh::Mesh;
 use crate::note::{self, Note};
 use crate::soup::{Facet, Soup};
 use classify::Kind;
+pub(crate) use classify::without_mark;
 
 /// How an STL file is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -373,9 +373,12 @@ impl Resampler {
             self.branch = self.branch.opposite();
             self.single(stroke.kind, &target, legs)?;
         } else if stroke.kind == Kind::Travel && !self.reaches_run(strokes, index, self.branch) {
-            // Back to the side from which everything can be reached.
+            // Back to the side from which everything can be reached. An end on the axis has no
+            // direction that a bed could turn to before the next line leaves it.
             self.branch = Branch::Near;
-            self.single(stroke.kind, &target, legs)?;
+            let clearance = self.clear_radius(target.z);
+            let over_bed = outside(target.over_bed, self.over_bed, clearance);
+            self.single(stroke.kind, &Target { over_bed, ..target }, legs)?;
         } else {
             self.clear_of_axis(stroke.kind, &target, legs)?;
         }

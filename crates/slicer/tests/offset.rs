@@ -234,6 +234,26 @@ fn flat_charts_are_the_plane() {
     }
 }
 
+#[test]
+fn a_corner_exactly_on_the_axis_moves_like_any_other() {
+    for chart in [Chart::Sphere { radius: 60.0 }, Chart::Sphere { radius: 8.0 }] {
+        for turn in [0.0, 0.4, 1.0, 2.5, 4.0] {
+            let (sin, cos) = f64::sin_cos(turn);
+            let place = |x: f64, y: f64| Point2::new(x * cos - y * sin, x * sin + y * cos);
+            let all = [place(0.0, 0.0), place(1.5, 0.0), place(1.5, 1.5), place(0.0, 1.5)];
+            let inset = chart.inset(&region(&[all.to_vec()]), 0.225);
+            let corner = place(0.225, 0.225);
+            // All within the layer, as far from the borders as asked for.
+            for (a, _) in inset.rings().flat_map(|ring| ring_sides(ring)) {
+                let away = distance_to_border(&chart, &region(&[all.to_vec()]), &mm(a));
+                assert!((away - 0.225).abs() < 0.002, "{chart:?}, {turn}: {away} mm");
+            }
+            let nearest = inset.rings().flatten().map(|p| (mm(*p) - corner).norm());
+            assert!(nearest.fold(f64::INFINITY, f64::min) < 0.002, "{chart:?}, {turn}");
+        }
+    }
+}
+
 /// Many places about the apex, each with whether a region holds it and how far its border is.
 fn places(chart: &Chart, shape: &Region, reach: f64) -> Vec<(Point2<f64>, bool, f64)> {
     const HALF: i32 = 12;

@@ -4,6 +4,7 @@
 
 use super::{Given, ModelError, facet, shown};
 use crate::soup::Soup;
+use crate::stl::without_mark;
 
 pub(super) fn read(bytes: &[u8]) -> Result<Given, ModelError> {
     if bytes.contains(&0) {
@@ -13,7 +14,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Given, ModelError> {
     let mut vertices: Vec<[f64; 3]> = Vec::new();
     let mut soup = Soup::default();
     let mut corners = Vec::new();
-    let mut lines = Lines { rest: bytes, number: 0 };
+    // A mark before the first line would hide its vertex, and all faces would take the wrong corners.
+    let mut lines = Lines { rest: without_mark(bytes), number: 0 };
     let mut long = Vec::new();
     while let Some((number, line)) = lines.next_whole(&mut long) {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
@@ -139,6 +141,14 @@ mod tests {
                 [[0.0, 0.0, 10.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.0]],
             ]
         );
+    }
+
+    #[test]
+    fn a_mark_before_the_text_hides_no_vertex() {
+        let text = "v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nv 5 5 5\r\nf 1 2 3\r\n";
+        let plain = read(text.as_bytes()).unwrap().soup.facets;
+        assert_eq!(plain, [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]);
+        assert_eq!(read(format!("\u{feff}{text}").as_bytes()).unwrap().soup.facets, plain);
     }
 
     #[test]

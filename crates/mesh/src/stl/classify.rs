@@ -81,7 +81,7 @@ pub(super) fn whole_facets(bytes: &[u8]) -> usize {
 }
 
 /// Returns the bytes after a UTF-8 byte order mark.
-pub(super) fn without_mark(bytes: &[u8]) -> &[u8] {
+pub(crate) fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 

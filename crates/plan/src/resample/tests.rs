@@ -122,6 +122,18 @@ fn the_far_side_is_left_when_the_next_run_is_out_of_its_reach() {
 }
 
 #[test]
+fn a_travel_from_the_far_side_to_the_axis_ends_clear_of_it() {
+    let mut resampler = Resampler::new(&printer(), PARAMS);
+    legs(&mut resampler, &[travel(10.0, 0.0), travel(-20.0, 0.0)]);
+    assert!(resampler.joints().s < 0.0, "it stands behind the axis");
+    // The far side does not reach what follows.
+    let path = [travel(0.0, 0.0), print(-30.0, 30.0)];
+    let all = legs(&mut resampler, &path);
+    assert!(all.iter().all(|leg| leg.to.s.abs() >= printer().axis_clearance - 1e-9));
+    assert!(deviation(all[0].to, &all[1..], [0.0, 0.0], [-30.0, 30.0]) <= 0.03);
+}
+
+#[test]
 fn ends_on_the_axis_are_kept_clear_of_it() {
     let mut resampler = Resampler::new(&printer(), PARAMS);
     let path = [travel(5.0, 5.0), print(0.0, 0.0), print(-4.0, 3.0)];

@@ -259,19 +259,18 @@ impl Side {
 /// the ways from a bent side would cross each other.
 fn sides_of(chart: &Chart, ring: &[GridPoint], shift: f64) -> Vec<Side> {
     let count = ring.len();
-    let Chart::Cone { cos } = *chart else {
-        return (0..count)
-            .map(|i| Side::new(mm(ring[i]), mm(ring[(i + 1) % count]), None))
-            .collect();
-    };
-    // A side that passes the apex at p has the curvature tan²/p.
-    let near = 2.0 * shift.abs() * (1.0 / (cos * cos) - 1.0).max(1.0);
+    // Both sides at a corner on the axis begin from one meridian, or their turn would not be seen.
     let points: Vec<Point2<f64>> = (0..count)
         .map(|i| {
             let before = mm(ring[i]) - mm(ring[(i + count - 1) % count]);
             off_axis(mm(ring[i]), &before.normalize())
         })
         .collect();
+    let Chart::Cone { cos } = *chart else {
+        return (0..count).map(|i| Side::new(points[i], points[(i + 1) % count], None)).collect();
+    };
+    // A side that passes the apex at p has the curvature tan²/p.
+    let near = 2.0 * shift.abs() * (1.0 / (cos * cos) - 1.0).max(1.0);
     let mut sides = Vec::with_capacity(count);
     for i in 0..count {
         let (from, to) = (points[i], points[(i + 1) % count]);
