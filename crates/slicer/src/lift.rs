@@ -41,14 +41,6 @@ const NARROW_IN_WIDTHS: f64 = 2.0;
 /// volume of 0.3 mm of a bead.
 const LEAST_BARE_MM2: f64 = 0.25;
 
-/// Nearer to the axis than the first a bead lies on both sides of it, and from the second on it is as narrow
-/// as its middle is, mm: nothing jumps at the tip of a cone, whose volume is nothing.
-const NEAR_AXIS_MM: [f64; 2] = [0.5, 2.0];
-
-/// Over which distance it is seen how normals draw near each other along the meridian, mm: much less than
-/// any layer bends in, and far above rounding.
-const DOWN_STEP_MM: f64 = 0.01;
-
 /// By how much the depth of a place changes along a layer, at most: that of layers of 60°.
 const STEEPEST_WEDGE: f64 = 1.75;
 
@@ -211,30 +203,10 @@ impl Lift<'_> {
             (None, Some(base)) => self.mean_thickness(uv, bead.spacing(), base),
             (None, None) => self.thickness(&at),
         };
-        let spacing = bead.spacing() * self.narrowing(uv, &at, thickness);
-        if thickness == bead.thickness && spacing == bead.spacing() {
+        if thickness == bead.thickness {
             return Station { at, bead, overhang };
         }
-        Station { at, bead: Bead::with_spacing(spacing, thickness), overhang }
-    }
-
-    /// By how much a bead is narrower halfway down than on the upper side of its layer, where its line runs:
-    /// the normals draw near each other downwards on domes, and part in bowls. With that, beads hold what
-    /// the layer does, whose volume is its thickness times its section halfway.
-    fn narrowing(&self, uv: &Point2<f64>, at: &Point3<f64>, thickness: f64) -> f64 {
-        let s = uv.coords.norm();
-        let share = ((s - NEAR_AXIS_MM[0]) / (NEAR_AXIS_MM[1] - NEAR_AXIS_MM[0])).min(1.0);
-        if self.surface.form().is_flat() || share <= 0.0 {
-            return 1.0;
-        }
-        let upper = self.level.upper;
-        let middle = upper - thickness / 2.0 / self.surface.thickness_per_level(at);
-        let charts = [upper, middle].map(|level| self.surface.chart(level));
-        let down = |s: f64| self.surface.carry(s, upper, middle);
-        let around = charts[1].radius(down(s)) / charts[0].radius(s);
-        let along = (down(s + DOWN_STEP_MM) - down(s - DOWN_STEP_MM)) / (2.0 * DOWN_STEP_MM);
-        let area = around * along;
-        if area.is_finite() { 1.0 + share * (area - 1.0) } else { 1.0 }
+        Station { at, bead: Bead::with_spacing(bead.spacing(), thickness), overhang }
     }
 
     /// The mean thickness across a bead of a layer on a floor, mm: over a wedge it changes within the width
