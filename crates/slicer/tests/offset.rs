@@ -237,9 +237,13 @@ fn flat_charts_are_the_plane() {
 #[test]
 fn a_corner_exactly_on_the_axis_moves_like_any_other() {
     for chart in [Chart::Sphere { radius: 60.0 }, Chart::Sphere { radius: 8.0 }] {
-        for turn in [0.0, 0.4, 1.0, 2.5, 4.0] {
+        // On it, or a step of the grid beside it.
+        let beside = [(0.0, 0.0), (1e-5, 0.0), (-1e-5, 0.0), (0.0, 1e-5), (0.0, -1e-5)];
+        for (turn, (u, v)) in
+            [0.0, 0.4, 1.0, 2.5, 4.0].into_iter().flat_map(|turn| beside.map(|b| (turn, b)))
+        {
             let (sin, cos) = f64::sin_cos(turn);
-            let place = |x: f64, y: f64| Point2::new(x * cos - y * sin, x * sin + y * cos);
+            let place = |x: f64, y: f64| Point2::new(x * cos - y * sin + u, x * sin + y * cos + v);
             let all = [place(0.0, 0.0), place(1.5, 0.0), place(1.5, 1.5), place(0.0, 1.5)];
             let inset = chart.inset(&region(&[all.to_vec()]), 0.225);
             let corner = place(0.225, 0.225);

@@ -655,7 +655,9 @@ impl Mover<'_> {
 
 /// A point on the axis moved off it, to the left of `direction`.
 fn off_axis(p: Point2<f64>, direction: &Vector2<f64>) -> Point2<f64> {
-    if p.coords.norm_squared() >= AXIS_MM * AXIS_MM {
+    // Half of it decides: places are 0 or a grid step from the axis and more, so that the rounding of a
+    // step, or of a place that was moved before, never moves it to another meridian.
+    if p.coords.norm_squared() >= AXIS_MM * AXIS_MM / 4.0 {
         return p;
     }
     Point2::new(-direction.y * AXIS_MM, direction.x * AXIS_MM)
