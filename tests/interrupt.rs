@@ -55,3 +55,24 @@ fn an_interrupted_run_leaves_nothing_behind() {
 fn a_terminated_run_leaves_nothing_behind() {
     stops_on("TERM");
 }
+
+#[test]
+fn a_batch_that_is_asked_to_stop_keeps_what_is_finished() {
+    let scratch = Scratch::new();
+    scratch.cube("a.stl", 3.0);
+    scratch.cube("b.stl", 100.0);
+    let fine = ["batch", "a.stl", "b.stl", "--out-dir", "out", "--set", "layer_height_mm=0.05"];
+    let mut batch = scratch.rhumb(&fine);
+    let child = batch.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let start = Instant::now();
+    while !scratch.path("out/a.gcode").exists() {
+        assert!(start.elapsed() < PATIENCE, "the first model is never done");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let sent = Command::new("kill").args(["-s", "TERM", &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let ran = Ran::from(child.wait_with_output().unwrap()).refused("Interrupted", 130);
+    assert!(ran.err.contains("what was finished is kept"), "{}", ran.err);
+    assert!(ran.err.contains("goes on where"), "{}", ran.err);
+    assert!(scratch.path("out/a.gcode").exists() && !scratch.path("out/b.gcode").exists());
+}

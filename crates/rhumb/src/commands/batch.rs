@@ -68,7 +68,7 @@ pub(super) fn run(arguments: &Batch, manner: &Manner) -> Result<u8, Failure> {
         )?),
         is_told: !(manner.quiet || manner.json),
     };
-    let records = batch.all(&models, &programs)?;
+    let records = batch.all(&models, &programs).map_err(stopped)?;
     let done = records.iter().filter(|record| record.is_done()).count();
     let report = Report {
         rhumb: env!("CARGO_PKG_VERSION"),
@@ -85,6 +85,15 @@ pub(super) fn run(arguments: &Batch, manner: &Manner) -> Result<u8, Failure> {
         say(&summary(&report, &target))?;
     }
     Ok(records.iter().map(|record| record.status).max().unwrap_or(DONE))
+}
+
+/// A stop as it is for many models: each that was finished has its program.
+fn stopped(failure: Failure) -> Failure {
+    if failure.class() != "Interrupted" {
+        return failure;
+    }
+    Failure::new("Interrupted", "stopped on request; what was finished is kept")
+        .hint("the same command goes on where this one stopped")
 }
 
 /// The models that are meant, folders replaced by what is in them.
