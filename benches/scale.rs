@@ -59,7 +59,7 @@ fn tables(folder: &Path, small: bool) -> Result<(), Box<dyn Error>> {
     head("layers")?;
     let model = stl::write(&shapes::icosphere(6, RADIUS_MM));
     let mut points = Vec::new();
-    for height in [0.4, 0.2, 0.1, 0.05] {
+    for height in [0.3, 0.2, 0.1, 0.05] {
         let taken = median(&model, height, 1)?;
         row(&taken.layers.to_string(), &taken, floor(folder, &model, taken.bytes)?)?;
         points.push((taken.layers as f64, taken.whole));
