@@ -7,19 +7,10 @@ use mesh::mesh::Mesh;
 use mesh::shapes::{block, extruded};
 
 use crate::program::{Motion, motions};
-use crate::run::Scratch;
+use crate::run::sliced_mesh as sliced;
 
 const SURFACES: [&[&str]; 3] =
     [&[], &["--layers", "conical", "--cone-angle", "20"], &["--layers", "spherical"]];
-
-fn sliced(mesh: &Mesh, more: &[&str]) -> String {
-    let scratch = Scratch::new();
-    scratch.file("m.stl", mesh::stl::write(mesh));
-    let mut all = vec!["slice", "m.stl", "-q", "-o", "x.gcode", "--orient", "keep"];
-    all.extend(more);
-    scratch.run(&all).expect(0);
-    std::fs::read_to_string(scratch.path("x.gcode")).unwrap()
-}
 
 fn with(surface: &[&'static str], set: &[&'static str]) -> Vec<&'static str> {
     let set = set.iter().flat_map(|pair| ["--set", pair]);

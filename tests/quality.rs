@@ -7,7 +7,7 @@ use mesh::shapes::extruded;
 use nalgebra::{Isometry3, Vector3};
 
 use crate::program::{Motion, beads, motions};
-use crate::run::Scratch;
+use crate::run::{Scratch, sliced_mesh as sliced};
 
 /// A profile in the upright plane through x, `depth` mm deep along y.
 fn upright(profile: &[[f64; 2]], depth: f64) -> Mesh {
@@ -30,15 +30,6 @@ fn portal(gap: f64) -> Mesh {
         [-outer, 13.0],
     ];
     upright(&profile, 14.0)
-}
-
-fn sliced(mesh: &Mesh, more: &[&str]) -> String {
-    let scratch = Scratch::new();
-    scratch.file("m.stl", mesh::stl::write(mesh));
-    let mut all = vec!["slice", "m.stl", "-q", "-o", "x.gcode", "--orient", "keep"];
-    all.extend(more);
-    scratch.run(&all).expect(0);
-    std::fs::read_to_string(scratch.path("x.gcode")).unwrap()
 }
 
 /// The piece of a motion in the part: its begin and its way.

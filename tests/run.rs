@@ -139,3 +139,13 @@ pub(crate) fn say(text: &str) {
     use std::io::Write as _;
     let _ = writeln!(std::io::stderr(), "{text}");
 }
+
+/// The program of a mesh as it stands.
+pub(crate) fn sliced_mesh(mesh: &mesh::mesh::Mesh, more: &[&str]) -> String {
+    let scratch = Scratch::new();
+    scratch.file("m.stl", mesh::stl::write(mesh));
+    let mut all = vec!["slice", "m.stl", "-q", "-o", "x.gcode", "--orient", "keep"];
+    all.extend(more);
+    scratch.run(&all).expect(0);
+    std::fs::read_to_string(scratch.path("x.gcode")).unwrap()
+}

@@ -1,5 +1,8 @@
 //! The sections that a window of layers needs: its own, and those above and below that decide on
 //! its skins.
+//!
+//! Planar layers whose sections and neighbours are those of the layer below, as between upright walls,
+//! are taken apart into walls and skins once for all of them.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;

@@ -3,7 +3,8 @@
 //! Lines are straight between the stations of a toolpath, and a straight line of a chart is not:
 //! it is halved until its pieces lie on the layer to within [`CHORD_MM`].
 //!
-//! Where layers begin on a flat floor, beads are as thick as [`stacking`](crate::stacking) says.
+//! Where layers begin on a flat floor, beads are as thick as [`stacking`](crate::stacking) says; where
+//! the wedge there is too narrow for any bead, the layer above goes down to the floor instead.
 
 use geom::grid::{GridPoint, mm};
 use geom::polyline::distance_to_segment;
@@ -345,18 +346,16 @@ mod tests {
         points.iter().map(|&p| (Point2::from(p), BEAD)).collect()
     }
 
+    /// A layer on nothing but the one below.
+    fn free(surface: &dyn LayerSurface, level: Level) -> Lift<'_> {
+        let (floor, ceiling, stair, below, bare) = (None, None, None, None, None);
+        Lift { surface, level, floor, ceiling, stair, below, bare }
+    }
+
     #[test]
     fn flat_lines_keep_their_points() {
         let level = Level { index: 3, lower: 0.6, upper: 0.8 };
-        let lift = Lift {
-            surface: &Plane,
-            level,
-            floor: None,
-            ceiling: None,
-            stair: None,
-            below: None,
-            bare: None,
-        };
+        let lift = free(&Plane, level);
         let stations = lift.stations(&line(&[[-8.0, 1.0], [8.0, 1.0], [0.0, 9.0]]), true);
         assert_eq!(stations.len(), 3);
         assert!(stations.iter().all(|s| s.bead == BEAD && s.at.z == 0.8));
@@ -369,15 +368,7 @@ mod tests {
         let families: [(&dyn LayerSurface, f64); 2] = [(&cone, 0.5_f64.cos()), (&spheres, 1.0)];
         for (surface, cos) in families {
             let level = Level { index: 0, lower: 20.0, upper: 20.0 + 0.2 / cos };
-            let lift = Lift {
-                surface,
-                level,
-                floor: None,
-                ceiling: None,
-                stair: None,
-                below: None,
-                bare: None,
-            };
+            let lift = free(surface, level);
             // The last passes the axis as near as lines of an infill may.
             let turns = [[-12.0, 3.0], [9.0, 3.0], [4.0, -11.0], [-0.0375, 0.001], [0.0625, 0.001]];
             let stations = lift.stations(&line(&turns), false);
