@@ -652,6 +652,7 @@ M84
 ; filament_max_volumetric_speed = 11
 ; filament_min_volumetric_speed = 0.1
 ; retract_length = 0.8
+; retract_restart_extra = 0
 ; retract_speed = 35
 ; deretract_speed = 0
 ; retract_layer_change = 0
@@ -685,6 +686,7 @@ M84
 ; cusp_area_share = 0%
 ; perimeters = 2
 ; external_perimeters_first = 0
+; wall_sequence = inner-outer
 ; avoid_crossing_perimeters = 0
 ; only_one_perimeter_top = 0
 ; only_one_perimeter_first_layer = 0

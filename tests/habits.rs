@@ -140,6 +140,18 @@ fn a_brim_lies_where_it_is_wanted() {
 }
 
 #[test]
+fn more_or_less_filament_than_was_drawn_back_is_fed_as_told() {
+    for (set, wanted) in
+        [("retract_restart_extra_mm=0.06", 0.86), ("retract_restart_extra_mm=-0.05", 0.75)]
+    {
+        let text = sliced(&block(9.0, 9.0, 2.0), &with(SURFACES[0], &[set, "wipe_mm=0"]));
+        let all = motions(&text);
+        let fed = || all.iter().filter(|m| m.path() == 0.0 && m.e > 0.0).map(|m| m.e);
+        assert!(fed().count() > 3 && fed().all(|e| (e - wanted).abs() < 1e-4), "{set}");
+    }
+}
+
+#[test]
 fn filament_is_fed_as_fast_as_told_and_drawn_back_at_layers() {
     for surface in SURFACES {
         let set = [

@@ -1,8 +1,6 @@
 //! What people print: models of several formats, turned, mirrored and cut, and several of them on one
 //! bed.
 
-use std::io::Write;
-
 use serde_json::Value;
 
 use crate::program::{Motion, motions, stl_volume};
@@ -69,27 +67,34 @@ fn xml(unit: &str, [x, y, z]: [f64; 3], places: &[[f64; 3]]) -> String {
     )
 }
 
-/// A ZIP archive of one member, which is stored as it is.
-fn zip(name: &str, content: &[u8]) -> Vec<u8> {
-    let mut crc = flate2::Crc::new();
-    crc.update(content);
-    let mut fields = vec![20, 0, 0, 0, 0, 0, 0, 0, 0, 0];
-    fields.extend(crc.sum().to_le_bytes());
-    fields.extend([(content.len() as u32).to_le_bytes(); 2].as_flattened());
-    fields.extend((name.len() as u16).to_le_bytes());
-    fields.extend([0, 0]);
-    let local = [b"PK\x03\x04", fields.as_slice(), name.as_bytes(), content].concat();
-    let entry = [b"PK\x01\x02\x14\x00", fields.as_slice(), &[0; 14], name.as_bytes()].concat();
-    let mut bytes = [local.as_slice(), &entry].concat();
-    bytes.write_all(b"PK\x05\x06\0\0\0\0\x01\0\x01\0").unwrap();
-    bytes.extend((entry.len() as u32).to_le_bytes());
-    bytes.extend((local.len() as u32).to_le_bytes());
+/// A ZIP archive of members that are stored as they are.
+fn zip(members: &[(&str, &[u8])]) -> Vec<u8> {
+    let (mut bytes, mut directory) = (Vec::new(), Vec::new());
+    for (name, content) in members {
+        let mut crc = flate2::Crc::new();
+        crc.update(content);
+        let mut fields = vec![20, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+        fields.extend(crc.sum().to_le_bytes());
+        fields.extend([(content.len() as u32).to_le_bytes(); 2].as_flattened());
+        fields.extend((name.len() as u16).to_le_bytes());
+        fields.extend([0, 0]);
+        directory.extend([b"PK\x01\x02\x14\x00", fields.as_slice(), &[0; 10]].concat());
+        directory.extend((bytes.len() as u32).to_le_bytes());
+        directory.extend(name.as_bytes());
+        bytes.extend([b"PK\x03\x04", fields.as_slice(), name.as_bytes(), content].concat());
+    }
+    let begin = bytes.len() as u32;
+    let count = (members.len() as u16).to_le_bytes();
+    bytes.extend(&directory);
+    bytes.extend([b"PK\x05\x06\0\0\0\0", count.as_slice(), &count].concat());
+    bytes.extend((directory.len() as u32).to_le_bytes());
+    bytes.extend(begin.to_le_bytes());
     bytes.extend([0, 0]);
     bytes
 }
 
 fn threemf(unit: &str, size: [f64; 3], places: &[[f64; 3]]) -> Vec<u8> {
-    zip("3D/3dmodel.model", xml(unit, size, places).as_bytes())
+    zip(&[("3D/3dmodel.model", xml(unit, size, places).as_bytes())])
 }
 
 #[test]
@@ -130,6 +135,94 @@ fn objects_of_a_3mf_keep_their_places() {
     scratch.file("one.3mf", threemf("millimeter", [4.0, 5.0, 8.0], &places[..1]));
     self::report(&scratch, &["one.3mf"]);
     assert_eq!(size(&scratch)[2], 4.0);
+}
+
+#[test]
+fn objects_of_a_3mf_are_models_each() {
+    let scratch = Scratch::new();
+    let places = [[100.0, 100.0, 0.0], [130.0, 100.0, 0.0]];
+    let text = xml("millimeter", [8.0, 8.0, 6.0], &places);
+    // Two objects that are alike, the second with settings of its own.
+    let (first, rest) = (text.find("<object id").unwrap(), text.find("</resources>").unwrap());
+    let object = text[first..rest].to_owned();
+    let other = object.replacen("id=\"1\"", "id=\"2\" name=\"wheel\"", 1);
+    let text = text.replacen(&object, &(object.clone() + &other), 1);
+    let last = text.rfind("objectid=\"1\"").unwrap();
+    let text = format!("{}objectid=\"2\"{}", &text[..last], &text[last + 12..]);
+    let config = "<config><object id=\"2\"><metadata type=\"object\" key=\"perimeters\" value=\"4\"/>\
+                  <metadata type=\"object\" key=\"extruder\" value=\"2\"/></object></config>";
+    let members = [
+        ("3D/3dmodel.model", text.as_bytes()),
+        ("Metadata/Slic3r_PE_model.config", config.as_bytes()),
+    ];
+    scratch.file("plate.3mf", zip(&members));
+    let report_of = |own: &[&str]| {
+        let all = [&["plate.3mf", "--dialect", "klipper-polar"], own].concat();
+        let report = report(&scratch, &all);
+        (report, std::fs::read_to_string(scratch.path("out.gcode")).unwrap())
+    };
+    // They have their names, places and numbers; their settings only when that is asked for.
+    let (plain, program) = report_of(&[]);
+    assert_eq!(placed(&scratch), [[-19.0, -4.0, 0.0], [19.0, 4.0, 6.0]]);
+    assert!(program.contains("EXCLUDE_OBJECT_START NAME=plate_1\n"));
+    assert!(program.contains("EXCLUDE_OBJECT_START NAME=wheel_2\n"));
+    assert!(
+        !program.contains("perimeters=4")
+            && plain["warnings"].to_string().contains("--file-settings")
+    );
+    let (told, program) = report_of(&["--file-settings"]);
+    assert!(program.contains("\n; model 2: perimeters=4\n"));
+    assert!(told["warnings"].to_string().contains("object 2 (wheel)"), "{}", told["warnings"]);
+    assert!(told["warnings"].to_string().contains("extruder"));
+    // How many lines of an object lay its inner walls.
+    let inner = |program: &str, name: &str| {
+        let begin = format!("EXCLUDE_OBJECT_START NAME={name}\n");
+        let parts = program.split(&begin).skip(1);
+        let of = parts.map(|part| part.split("EXCLUDE_OBJECT_END").next().unwrap_or(""));
+        let roles = of.flat_map(|part| part.split(";TYPE:").skip(1));
+        let walls = roles.filter(|role| role.starts_with("Perimeter\n"));
+        walls.map(|wall| wall.lines().count()).sum::<usize>()
+    };
+    assert!(inner(&program, "wheel_2") > 2 * inner(&program, "plate_1"));
+    // The user has the last word, by the number of the object.
+    let (_, program) = report_of(&["--file-settings", "--object", "2:perimeters=2"]);
+    assert!(program.contains("\n; model 2: perimeters=2\n"));
+    let (wheel, plate) = (inner(&program, "wheel_2"), inner(&program, "plate_1"));
+    assert!(wheel.abs_diff(plate) < plate / 20, "{wheel} {plate}");
+    let refused = scratch.run(&["slice", "plate.3mf", "--object", "3:perimeters=2"]).expect(2);
+    assert!(refused.err.contains("there are models 1 to 2"), "{}", refused.err);
+    // A cut goes through both, and copies are of the whole plate.
+    report(&scratch, &["plate.3mf", "--cut", "2"]);
+    assert_eq!(placed(&scratch), [[-19.0, -4.0, 0.0], [19.0, 4.0, 2.0]]);
+    let twice = report(&scratch, &["plate.3mf", "--copies", "2"]);
+    assert_eq!(twice["mesh"]["shells"], 4);
+}
+
+#[test]
+fn bodies_of_a_model_may_be_models_each() {
+    let scratch = Scratch::new();
+    let mut soup = Vec::new();
+    for x in [0.0, 20.0, 40.0] {
+        let block = mesh::shapes::block(8.0, 8.0, 4.0);
+        let moved = block.transformed(&nalgebra::Isometry3::translation(x, 0.0, 0.0));
+        soup.extend((0..moved.triangles.len() as u32).map(|t| moved.corners(t)));
+    }
+    let corners = soup.iter().flatten().copied().collect::<Vec<_>>();
+    let triangles = (0..soup.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    scratch.file("three.stl", mesh::stl::write(&mesh::mesh::Mesh { vertices: corners, triangles }));
+    let program = |arguments: &[&str]| {
+        let all = [&["three.stl", "--dialect", "klipper-polar"], arguments].concat();
+        report(&scratch, &all);
+        std::fs::read_to_string(scratch.path("out.gcode")).unwrap()
+    };
+    assert!(!program(&[]).contains("EXCLUDE_OBJECT"));
+    let whole = placed(&scratch);
+    let split = program(&["--split", "--object", "2:perimeters=4"]);
+    assert_eq!(placed(&scratch), whole, "bodies keep their places");
+    for k in 1..=3 {
+        assert!(split.contains(&format!("EXCLUDE_OBJECT_START NAME=three_{k}\n")));
+    }
+    assert!(split.contains("\n; model 2: perimeters=4\n"));
 }
 
 #[test]
@@ -227,11 +320,11 @@ fn hostile_packages_are_refused() {
     ];
     for (text, class, status) in cases {
         assert_ne!(text, sound);
-        scratch.file("m.3mf", zip("3D/3dmodel.model", text.as_bytes()));
+        scratch.file("m.3mf", zip(&[("3D/3dmodel.model", text.as_bytes())]));
         let ran = scratch.run(&["slice", "m.3mf"]).expect(status);
         assert!(ran.err.contains(&format!("error[{class}]: m.3mf: ")), "{}", ran.err);
     }
-    let whole = zip("3D/3dmodel.model", sound.as_bytes());
+    let whole = zip(&[("3D/3dmodel.model", sound.as_bytes())]);
     for length in [0, 1, 30, whole.len() / 2, whole.len() - 1] {
         scratch.file("m.3mf", &whole[..length]);
         scratch.run(&["slice", "m.3mf"]).expect(4);
@@ -244,10 +337,10 @@ fn settings_in_a_3mf_become_profiles() {
     let scratch = Scratch::new();
     let prusa =
         "; generated by PrusaSlicer\n\n; perimeters = 4\n; layer_height = 0.25\n; wipe_tower = 1\n";
-    scratch.file("prusa.3mf", zip("Metadata/Slic3r_PE.config", prusa.as_bytes()));
+    scratch.file("prusa.3mf", zip(&[("Metadata/Slic3r_PE.config", prusa.as_bytes())]));
     let orca =
         r#"{"wall_loops": "5", "sparse_infill_pattern": "gyroid", "prime_tower_width": "35"}"#;
-    scratch.file("orca.3mf", zip("Metadata/project_settings.config", orca.as_bytes()));
+    scratch.file("orca.3mf", zip(&[("Metadata/project_settings.config", orca.as_bytes())]));
     for (name, taken, unknown) in [
         ("prusa", ["perimeters = 4", "layer_height_mm = 0.25"], "wipe_tower"),
         ("orca", ["perimeters = 5", "fill_pattern = gyroid"], "prime_tower_width"),

@@ -48,6 +48,7 @@ pub mod place;
 pub mod repair;
 pub mod shapes;
 pub mod soup;
+pub mod split;
 pub mod stl;
 pub mod topology;
 pub mod weld;

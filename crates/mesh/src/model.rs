@@ -11,6 +11,7 @@ mod threemf;
 use crate::note::Note;
 use crate::soup::{Facet, Soup};
 use crate::stl::{self, StlError};
+use std::ops::Range;
 use std::path::Path;
 
 /// How a model is kept.
@@ -48,10 +49,45 @@ impl Format {
 pub struct Given {
     /// The facets of all objects, where they are to be built; mm if the file has a unit.
     pub soup: Soup,
-    /// How many objects those are: more than one have places with regard to each other.
-    pub objects: usize,
+    /// The objects that those are, in the order of their facets: more than one have places with regard
+    /// to each other.
+    pub objects: Vec<Built>,
     /// What the user should know.
     pub notes: Vec<Note>,
+}
+
+/// One of the objects that a file holds, where it is to be built.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Built {
+    /// What the file calls it, printable and not long; empty when it has no name.
+    pub name: String,
+    /// Its facets among those of all.
+    pub facets: Range<usize>,
+    /// The settings that it alone is to have, if there are any.
+    pub settings: Option<OwnSettings>,
+}
+
+/// Settings of one object, as another slicer wrote them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OwnSettings {
+    /// Whose words they are.
+    pub slicer: Slicer,
+    /// Keys and values, as they stand in the file.
+    pub pairs: Vec<(String, String)>,
+}
+
+/// A slicer that keeps settings in a 3MF.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Slicer {
+    /// PrusaSlicer and its like.
+    Prusa,
+    /// OrcaSlicer and its like.
+    Orca,
+}
+
+/// The only object of a file.
+fn alone(soup: &Soup) -> Vec<Built> {
+    vec![Built { name: String::new(), facets: 0..soup.facets.len(), settings: None }]
 }
 
 /// Why a file cannot be read.
@@ -132,7 +168,7 @@ pub fn read(format: Format, bytes: &[u8]) -> Result<Given, ModelError> {
     let given = match format {
         Format::Stl => {
             let (soup, report) = stl::read(bytes)?;
-            Given { soup, objects: 1, notes: report.notes }
+            Given { objects: alone(&soup), soup, notes: report.notes }
         }
         Format::ThreeMf => threemf::read(bytes)?,
         Format::Obj => obj::read(bytes)?,

@@ -17,6 +17,10 @@ pub const NORMALS_IGNORED: &str = "NormalsIgnored";
 pub const NAME_SANITIZED: &str = "NameSanitized";
 /// Volumes of a model that are no part of its shape are left out.
 pub const VOLUMES_LEFT_OUT: &str = "VolumesLeftOut";
+/// An object of a file that encloses nothing is left out.
+pub const OBJECT_LEFT_OUT: &str = "ObjectLeftOut";
+/// A model has more bodies than it can be split into.
+pub const NOT_SPLIT: &str = "NotSplit";
 /// Settings of another slicer that come with a model are not taken over.
 pub const EMBEDDED_SETTINGS_IGNORED: &str = "EmbeddedSettingsIgnored";
 /// Vertices on open seams were joined within the weld tolerance.

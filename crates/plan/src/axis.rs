@@ -97,6 +97,26 @@ pub fn keep_clear(from: &Point2<f64>, [a, b]: [&Point2<f64>; 2], clearance: f64)
     pieces
 }
 
+/// Returns where the line from `a` to `b` enters the clearance and where it leaves it, as shares of the
+/// line; `None` for an end that lies within.
+#[must_use]
+pub fn crossings_of_rim([a, b]: [&Point2<f64>; 2], clearance: f64) -> [Option<f64>; 2] {
+    let way = b - a;
+    let square = way.norm_squared();
+    let is_outside = |p: &Point2<f64>| p.coords.norm() >= clearance * (1.0 - SLACK);
+    if square == 0.0 {
+        return [is_outside(a).then_some(0.0), is_outside(b).then_some(1.0)];
+    }
+    let foot = -a.coords.dot(&way) / square;
+    let from_axis = (a + way * foot).coords.norm_squared();
+    let half_chord = ((clearance * clearance - from_axis).max(0.0) / square).sqrt();
+    let share = |share: f64| share.clamp(0.0, 1.0);
+    [
+        is_outside(a).then(|| share(foot - half_chord)),
+        is_outside(b).then(|| share(foot + half_chord)),
+    ]
+}
+
 fn on_rim(p: Point2<f64>, clearance: f64) -> Point2<f64> {
     Point2::from(p.coords.normalize() * clearance)
 }
@@ -105,6 +125,18 @@ fn on_rim(p: Point2<f64>, clearance: f64) -> Point2<f64> {
 mod tests {
     use super::*;
     use std::f64::consts::PI;
+
+    #[test]
+    fn lines_cross_the_rim_where_they_enter_and_leave() {
+        let cross =
+            |a: [f64; 2], b: [f64; 2]| crossings_of_rim([&Point2::from(a), &Point2::from(b)], 0.5);
+        assert_eq!(cross([-1.0, 0.0], [1.0, 0.0]), [Some(0.25), Some(0.75)]);
+        assert_eq!(cross([-1.0, 0.3], [1.0, 0.3]), [Some(0.3), Some(0.7)]);
+        assert_eq!(cross([0.1, 0.0], [0.9, 0.0]), [None, Some(0.5)]);
+        assert_eq!(cross([0.9, 0.0], [0.1, 0.0]), [Some(0.5), None]);
+        assert_eq!(cross([0.1, 0.0], [0.0, 0.2]), [None, None]);
+        assert_eq!(cross([0.6, 0.0], [0.6, 0.0]), [Some(0.0), Some(1.0)]);
+    }
 
     fn points(way: &[Piece], from: Point2<f64>) -> Vec<Point2<f64>> {
         let mut list = vec![from];

@@ -21,10 +21,22 @@ pub struct OrderParams {
     pub seam: SeamPosition,
     /// Whether infill comes before walls, where layers are flat.
     pub infill_first: bool,
-    /// Whether the external wall comes before those behind it.
-    pub external_first: bool,
+    /// In which order the walls along an outline come, where layers are flat.
+    pub walls: WallOrder,
     /// Whether lower lines come before higher ones: on curved layers.
     pub uphill: bool,
+}
+
+/// In which order the walls along one outline are laid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WallOrder {
+    /// The external wall last, on the flanks of those behind it.
+    InsideOut,
+    /// The external wall first, so that nothing pushes it outwards.
+    OutsideIn,
+    /// The external wall after those far inside and before the one behind it: nothing pushes it, and the
+    /// travel to it ends on the part. Of two walls the external one comes first. As in OrcaSlicer.
+    InnerOuterInner,
 }
 
 /// A line in the order and direction in which it is laid; closed ones end where they begin.
@@ -202,8 +214,14 @@ impl Ordering<'_> {
         let behind = group.loops[1..].iter().map(|path| begun_near(path, &seam_at));
         let mut lines: Vec<OrderedLine> =
             std::iter::once(begun_at(external, seam)).chain(behind).collect();
-        if !self.params.external_first {
-            lines.reverse();
+        match self.params.walls {
+            WallOrder::OutsideIn => {}
+            WallOrder::InsideOut => lines.reverse(),
+            WallOrder::InnerOuterInner => {
+                let mut last_two: Vec<OrderedLine> = lines.drain(..lines.len().min(2)).collect();
+                lines.reverse();
+                lines.append(&mut last_two);
+            }
         }
         for line in lines {
             self.push(line);
@@ -471,13 +489,9 @@ mod tests {
         line(&corners, role, true)
     }
 
-    fn ordered(layer: &LayerPaths, external_first: bool) -> Vec<OrderedLine> {
-        let params = OrderParams {
-            seam: SeamPosition::Nearest,
-            infill_first: false,
-            external_first,
-            uphill: false,
-        };
+    fn ordered(layer: &LayerPaths, walls: WallOrder) -> Vec<OrderedLine> {
+        let params =
+            OrderParams { seam: SeamPosition::Nearest, infill_first: false, walls, uphill: false };
         order(layer, Point2::origin(), &mut SeamMemory::default(), &params)
     }
 
@@ -505,12 +519,34 @@ mod tests {
         let fills = vec![line(&[[-3.0, 0.0], [3.0, 0.0]], Role::InternalInfill, false)];
         let island = IslandPaths { walls: vec![walls], fills, ..IslandPaths::default() };
         let layer = LayerPaths { islands: vec![island], ..LayerPaths::default() };
-        let roles = |first| ordered(&layer, first).iter().map(|l| l.role).collect::<Vec<_>>();
-        assert_eq!(roles(false), [Role::Perimeter, Role::ExternalPerimeter, Role::InternalInfill]);
-        assert_eq!(roles(true), [Role::ExternalPerimeter, Role::Perimeter, Role::InternalInfill]);
-        for line in &ordered(&layer, false)[..2] {
+        let roles = |walls| ordered(&layer, walls).iter().map(|l| l.role).collect::<Vec<_>>();
+        let [outer, inner, infill] =
+            [Role::ExternalPerimeter, Role::Perimeter, Role::InternalInfill];
+        assert_eq!(roles(WallOrder::InsideOut), [inner, outer, infill]);
+        assert_eq!(roles(WallOrder::OutsideIn), [outer, inner, infill]);
+        assert_eq!(roles(WallOrder::InnerOuterInner), [outer, inner, infill]);
+        for line in &ordered(&layer, WallOrder::InsideOut)[..2] {
             assert_eq!(line.stations.first().unwrap().at, line.stations.last().unwrap().at);
         }
+    }
+
+    #[test]
+    fn the_external_wall_may_come_between_the_others() {
+        let sizes = [5.0, 4.6, 4.2, 3.8];
+        let role = |k| if k == 0 { Role::ExternalPerimeter } else { Role::Perimeter };
+        let orders = |n: usize, walls| {
+            let loops = (0..n).map(|k| square(0.0, 0.0, sizes[k], role(k))).collect();
+            let walls_of = vec![WallGroup { loops }];
+            let island = IslandPaths { walls: walls_of, ..IslandPaths::default() };
+            let layer = LayerPaths { islands: vec![island], ..LayerPaths::default() };
+            let reach =
+                |line: &OrderedLine| line.stations.iter().map(|s| s.at.x).fold(f64::MIN, f64::max);
+            ordered(&layer, walls).iter().map(reach).collect::<Vec<f64>>()
+        };
+        assert_eq!(orders(4, WallOrder::InnerOuterInner), [3.8, 4.2, 5.0, 4.6]);
+        assert_eq!(orders(3, WallOrder::InnerOuterInner), [4.2, 5.0, 4.6]);
+        assert_eq!(orders(1, WallOrder::InnerOuterInner), [5.0]);
+        assert_eq!(orders(4, WallOrder::InsideOut), [3.8, 4.2, 4.6, 5.0]);
     }
 
     #[test]
@@ -534,7 +570,7 @@ mod tests {
         let params = OrderParams {
             seam: SeamPosition::Nearest,
             infill_first: false,
-            external_first: false,
+            walls: WallOrder::InsideOut,
             uphill: true,
         };
         let lines = order(&layer, Point2::origin(), &mut SeamMemory::default(), &params);
@@ -554,7 +590,7 @@ mod tests {
         };
         let island = IslandPaths { walls: vec![walls], ..IslandPaths::default() };
         let layer = LayerPaths { islands: vec![island], ..LayerPaths::default() };
-        let lines = ordered(&layer, false);
+        let lines = ordered(&layer, WallOrder::InsideOut);
         let gap = lines[1].stations[0].at - lines[0].stations.last().unwrap().at;
         assert!(gap.norm() < 0.6, "{gap}");
     }
@@ -569,7 +605,8 @@ mod tests {
             islands: vec![island(50.0), island(10.0), island(30.0)],
             ..Default::default()
         };
-        let islands: Vec<_> = ordered(&layer, false).iter().map(|l| l.island).collect();
+        let islands: Vec<_> =
+            ordered(&layer, WallOrder::InsideOut).iter().map(|l| l.island).collect();
         assert_eq!(islands, [Some(1), Some(2), Some(0)]);
     }
 

@@ -382,10 +382,13 @@ impl<'a> Planner<'a> {
     pub fn finish(mut self) -> Result<(Vec<Step>, Totals), PlanError> {
         const CLEARANCE_MM: f64 = 5.0;
         self.follow(Plane.form());
-        let lift = CLEARANCE_MM.min(self.printer.lift.max - self.router.at().z).max(0.0);
-        let items = self.router.leave(lift, &self.params.filament);
         let fail = |source| PlanError { layer: 0, source };
+        let items = self.router.draw_back(&self.params.filament);
         let mut steps = self.lower(items).map_err(fail)?;
+        let home = Joints { s: self.printer.home.s, ..self.resampler.joints() };
+        let out = self.printer.alignment.part_from_joints(&home).xy();
+        let items = self.router.leave(&out, CLEARANCE_MM, self.printer.lift.max);
+        steps.extend(self.lower(items).map_err(fail)?);
         let from = self.resampler.joints();
         let to = self.resampler.as_written(&Joints { s: self.printer.home.s, ..from });
         let path = (to.s - from.s).abs();

@@ -25,7 +25,7 @@ use machine::profile::{Axis, Printer};
 use machine::program::{BedTurn, Joints};
 use nalgebra::{Point2, Point3, UnitComplex};
 
-use crate::axis::{Piece, distance_to_axis, keep_clear, outside};
+use crate::axis::{Piece, crossings_of_rim, distance_to_axis, keep_clear, outside};
 use crate::route::{Kind, Stroke};
 use crate::winding::{extent, unwinding};
 use sweep::Sweep;
@@ -137,7 +137,7 @@ pub struct Resampler {
     /// Where the nozzle stands over the bed; not always where the last stroke ended.
     over_bed: Point2<f64>,
     /// Where the last stroke ended, though that may be too near to the axis.
-    meant: Point2<f64>,
+    meant: Target,
     /// Where it stands in the part, as the text says it.
     at_part: Point3<f64>,
     /// Filament of strokes too short to be moves, for the next one that lays material, mm.
@@ -147,7 +147,7 @@ pub struct Resampler {
 }
 
 /// Where the nozzle is to be, over the bed.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Target {
     over_bed: Point2<f64>,
     z: f64,
@@ -174,7 +174,10 @@ impl Resampler {
             facing: UnitComplex::new(printer.alignment.bed.azimuth(printer.home.turn)),
             branch: Branch::Near,
             over_bed: Point2::from(printer.alignment.over_bed(&at.xy())),
-            meant: Point2::from(printer.alignment.over_bed(&at.xy())),
+            meant: Target {
+                over_bed: Point2::from(printer.alignment.over_bed(&at.xy())),
+                z: printer.home.z,
+            },
             at_part: at,
             owed: 0.0,
             owed_back: 0.0,
@@ -189,7 +192,8 @@ impl Resampler {
         let over_bed = Point2::from(self.alignment.over_bed(&at_part.xy()));
         let facing = UnitComplex::new(self.alignment.bed.azimuth(joints.turn));
         let branch = Branch::Near;
-        Self { joints, facing, branch, over_bed, meant: over_bed, at_part, ..self.clone() }
+        let meant = Target { over_bed, z: joints.z };
+        Self { joints, facing, branch, over_bed, meant, at_part, ..self.clone() }
     }
 
     /// Filament of strokes too short to be moves that is still to be laid, mm.
@@ -306,12 +310,18 @@ impl Resampler {
         legs: &mut Vec<Leg>,
     ) -> Result<(), Unreachable> {
         within(&self.lift, "lift", z)?;
+        // Filament alone leaves a height that was changed for the axis as it is.
+        let stays = stroke.kind == Kind::Filament && z == self.meant.z;
+        let z = if stays { self.joints.z } else { z };
         let to = self.params.dialect.rounded_joints(&Joints { z, ..self.joints });
         let path = if stroke.kind == Kind::Filament { 0.0 } else { (to.z - self.joints.z).abs() };
         if path == 0.0 && stroke.filament == 0.0 {
             return Ok(());
         }
         let filament = self.with_owed(stroke.kind, stroke.filament, true);
+        if !stays {
+            self.meant.z = z;
+        }
         self.joints = to;
         self.at_part = self.alignment.part_from_joints(&to);
         legs.push(Leg {
@@ -369,6 +379,8 @@ impl Resampler {
     ) -> Result<(), Unreachable> {
         let stroke = &strokes[index];
         let first = legs.len();
+        let meant = target;
+        let target = self.beside_axis(strokes, index, target);
         if self.passes_through(strokes, index, &target) {
             self.branch = self.branch.opposite();
             self.single(stroke.kind, &target, legs)?;
@@ -382,7 +394,7 @@ impl Resampler {
         } else {
             self.clear_of_axis(stroke.kind, &target, legs)?;
         }
-        self.meant = target.over_bed;
+        self.meant = meant;
         // The stroke's filament is spread over its legs by length.
         let length: f64 = legs[first..].iter().map(|leg| leg.path).sum();
         let filament = self.with_owed(stroke.kind, stroke.filament, legs.len() > first);
@@ -391,6 +403,26 @@ impl Resampler {
             leg.speed = stroke.speed;
         }
         Ok(())
+    }
+
+    /// A travel to where lines begin too near to the axis ends at the height at which they leave the
+    /// clearance.
+    fn beside_axis(&self, strokes: &[Stroke], index: usize, target: Target) -> Target {
+        let clearance = self.clear_radius(target.z);
+        if strokes[index].kind != Kind::Travel || target.over_bed.coords.norm() >= clearance {
+            return target;
+        }
+        let after = strokes[index + 1..].iter().filter(|stroke| stroke.kind != Kind::Filament);
+        let mut from = target;
+        for stroke in after.take_while(|stroke| stroke.kind == Kind::Print) {
+            let at = turned(&self.azimuth, &stroke.to);
+            let to = Point2::from(self.alignment.over_bed(&at.xy()));
+            if let [_, Some(share)] = crossings_of_rim([&from.over_bed, &to], clearance) {
+                return Target { z: from.z + (stroke.to.z - from.z) * share, ..target };
+            }
+            from = Target { over_bed: to, z: stroke.to.z };
+        }
+        target
     }
 
     /// The filament of a stroke with what strokes before it could not lay; or none, when it is too
@@ -416,7 +448,7 @@ impl Resampler {
         let clearance = self.clear_radius(self.joints.z).max(self.clear_radius(target.z));
         // Most lines are nowhere near.
         if distance_to_axis(&self.over_bed, &target.over_bed) >= clearance
-            && self.meant == self.over_bed
+            && self.meant.over_bed == self.over_bed
         {
             return self.line(kind, target, tolerance, legs);
         }
@@ -424,14 +456,13 @@ impl Resampler {
             over_bed: outside(self.over_bed, target.over_bed, clearance),
             z: self.joints.z,
         };
-        let way = keep_clear(&from.over_bed, [&self.meant, &target.over_bed], clearance);
-        let lengths = way_lengths(&way, from.over_bed, clearance);
-        let whole: f64 = lengths.iter().sum();
-        for (k, piece) in way.iter().enumerate() {
-            // What is left of the way decides, so that the end is exactly at the target.
-            let left: f64 = lengths[k + 1..].iter().sum();
-            let z =
-                if left > 0.0 { target.z - (target.z - from.z) * left / whole } else { target.z };
+        let line = [&self.meant.over_bed, &target.over_bed];
+        let way = keep_clear(&from.over_bed, line, clearance);
+        let heights = match kind {
+            Kind::Print => self.heights_on_layer(&way, target, clearance),
+            _ => heights_by_length(&way, &from, target.z, clearance),
+        };
+        for (piece, z) in way.iter().zip(heights) {
             match piece {
                 Piece::Line(to) => {
                     self.line(kind, &Target { over_bed: *to, z }, tolerance, legs)?;
@@ -442,6 +473,27 @@ impl Resampler {
             }
         }
         Ok(())
+    }
+
+    /// The heights at the ends of the pieces of a way that lays material. Outside of the clearance they are
+    /// those of the line, so that it stays on its layer, and on the rim those where the line crosses it: a
+    /// layer that slopes has another height on the axis, where nothing gets to.
+    fn heights_on_layer(&self, way: &[Piece], target: &Target, clearance: f64) -> Vec<f64> {
+        let crossings = crossings_of_rim([&self.meant.over_bed, &target.over_bed], clearance);
+        let height = |share: f64| self.meant.z + (target.z - self.meant.z) * share;
+        let [entry, exit] = match crossings.map(|share| share.map(height)) {
+            [Some(entry), Some(exit)] => [entry, exit],
+            [Some(rim), None] | [None, Some(rim)] => [rim; 2],
+            [None, None] => [self.joints.z; 2],
+        };
+        let ends_outside = crossings[1].is_some();
+        let last = way.len() - 1;
+        let at_end = |(k, piece): (usize, &Piece)| match piece {
+            Piece::Line(_) if k == last && ends_outside => target.z,
+            Piece::Line(_) => entry,
+            Piece::Arc(..) => exit,
+        };
+        way.iter().enumerate().map(at_end).collect()
     }
 
     /// How far from the axis places of the bed must be at a height, so that the nozzle and the carriage
@@ -709,9 +761,11 @@ fn turned(by: &UnitComplex<f64>, p: &Point3<f64>) -> Point3<f64> {
     Point3::new(xy.x, xy.y, p.z)
 }
 
-fn way_lengths(way: &[Piece], from: Point2<f64>, clearance: f64) -> Vec<f64> {
-    let mut at = from;
-    way.iter()
+/// The heights at the ends of the pieces of a way that changes its height evenly, exactly `z` at its end.
+fn heights_by_length(way: &[Piece], from: &Target, z: f64, clearance: f64) -> Vec<f64> {
+    let mut at = from.over_bed;
+    let lengths: Vec<f64> = way
+        .iter()
         .map(|piece| {
             let length = match piece {
                 Piece::Line(to) => (to - at).norm(),
@@ -719,6 +773,15 @@ fn way_lengths(way: &[Piece], from: Point2<f64>, clearance: f64) -> Vec<f64> {
             };
             at = piece.end();
             length
+        })
+        .collect();
+    let whole: f64 = lengths.iter().sum();
+    // What is left of the way decides, so that the end is exactly at the target.
+    let left = |k: usize| lengths[k + 1..].iter().sum::<f64>();
+    (0..way.len())
+        .map(|k| match left(k) {
+            left if left > 0.0 => z - (z - from.z) * left / whole,
+            _ => z,
         })
         .collect()
 }

@@ -5,7 +5,7 @@
 
 use geom::region::Region;
 use machine::program::{self, Layer, Step};
-use nalgebra::{Point3, distance};
+use nalgebra::{Point2, Point3, distance};
 use slicer::bead::Bead;
 use slicer::surface::{Form, LayerSurface, Plane};
 use slicer::toolpath::{LayerPaths, Overhang, Role, Station};
@@ -84,6 +84,8 @@ pub struct FilamentParams {
     pub least_flow: f64,
     /// Filament drawn back before a travel, mm; 0 for never.
     pub retract_length: f64,
+    /// Filament fed after a travel beyond what was drawn back, mm; less than zero to leave some out.
+    pub restart_extra: f64,
     /// Speed of drawing back, mm/s.
     pub retract_speed: f64,
     /// Speed of feeding again, mm/s.
@@ -274,11 +276,24 @@ impl Router {
         }
     }
 
-    /// Returns the strokes that draw the filament back and lift the nozzle by `lift` mm.
+    /// Returns the strokes that draw the filament back.
     #[must_use]
-    pub fn leave(&mut self, lift: f64, filament: &FilamentParams) -> Vec<Item> {
+    pub fn draw_back(&mut self, filament: &FilamentParams) -> Vec<Item> {
         self.retract(filament);
-        self.stroke(Kind::Travel, self.at + nalgebra::Vector3::z() * lift, 0.0, self.lift_speed);
+        std::mem::take(&mut self.items)
+    }
+
+    /// Returns the stroke that lifts the nozzle by `lift` mm above where it is and above all that stands on
+    /// or beside the straight way to `out`, but to no more than `most`.
+    #[must_use]
+    pub fn leave(&mut self, out: &Point2<f64>, lift: f64, most: f64) -> Vec<Item> {
+        let at = self.at;
+        let highest = self.printed.as_ref().map_or(at.z, |printed| {
+            let (_, on_it) = printed.over(&at, &Point3::new(out.x, out.y, at.z));
+            printed.beside(&at.xy(), out, on_it.max(at.z))
+        });
+        let height = (highest + lift).min(most).max(at.z);
+        self.stroke(Kind::Travel, Point3::new(at.x, at.y, height), 0.0, self.lift_speed);
         std::mem::take(&mut self.items)
     }
 
@@ -328,7 +343,8 @@ impl Router {
             self.go_over(to, self.at.z.max(to.z).max(highest) + lift, speed);
         }
         if self.retracted {
-            self.stroke(Kind::Filament, to, filament.retract_length, filament.feed_speed);
+            let fed = (filament.retract_length + filament.restart_extra).max(0.0);
+            self.stroke(Kind::Filament, to, fed, filament.feed_speed);
             self.retracted = false;
         }
     }
@@ -598,7 +614,6 @@ fn program_role(role: Role, overhang: Overhang) -> program::Role {
 mod tests {
     use super::*;
     use geom::region::Fill;
-    use nalgebra::Point2;
     use slicer::toolpath::IslandPaths;
 
     const BEAD: Bead = Bead { width: 0.45, thickness: 0.2 };
@@ -625,6 +640,7 @@ mod tests {
         volume_per_second: 11.0,
         least_flow: 0.1,
         retract_length: 0.8,
+        restart_extra: 0.0,
         retract_speed: 35.0,
         feed_speed: 20.0,
         retract_between_layers: false,
@@ -739,5 +755,22 @@ mod tests {
         let mut router = Router::new(Point3::new(0.0, 0.0, 0.8), 10.0, None);
         let strokes = strokes(&router.layer(&layer(), &[fat], &SPEEDS, &FILAMENT));
         assert!((strokes[0].speed * wide.area() - 11.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_nozzle_leaves_a_bowl_above_its_rim() {
+        let wall = |x: f64| [Point3::new(x, -20.0, 12.0), Point3::new(x, 20.0, 12.0)];
+        let inside = Point3::new(1.0, 0.0, 4.0);
+        let height = |walls: &[[Point3<f64>; 2]]| {
+            let mut printed = Printed::nothing(50.0, machine::profile::NozzleShape::COMMON);
+            walls.iter().for_each(|[a, b]| printed.add(a, b));
+            let mut router = Router::new(inside, 15.0, Some(printed));
+            let _ = router.leave(&Point2::new(50.0, 0.0), 5.0, 30.0);
+            router.at().z
+        };
+        assert_eq!(height(&[]), 9.0);
+        // What stands behind the nozzle is not on its way.
+        assert_eq!(height(&[wall(-45.0)]), 9.0);
+        assert!((height(&[wall(20.0)]) - 17.0).abs() < 1e-3);
     }
 }

@@ -319,10 +319,18 @@ pub struct Slice {
     /// How far the footprints of several models stay apart, mm
     #[arg(long, value_name = "MM", default_value_t = 6.0)]
     pub gap: f64,
-    /// Set one value for a model alone, by its place in the command line, counted from 1: walls, skins,
-    /// infill, moved outlines (repeatable)
+    /// Set one value for a model alone, by its place in the command line, counted from 1, each object of
+    /// a 3MF as one: walls, skins, infill, moved outlines (repeatable)
     #[arg(long, value_name = "N:KEY=VALUE", action = ArgAction::Append)]
     pub object: Vec<String>,
+    /// Take over the settings that a 3MF of PrusaSlicer or OrcaSlicer holds for single objects, as far as
+    /// an object alone can have them
+    #[arg(long)]
+    pub file_settings: bool,
+    /// Take each model apart into its bodies, which keep their places and are models each, with names and
+    /// numbers of their own
+    #[arg(long)]
+    pub split: bool,
     /// How often to print every model
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=100))]
     pub copies: u16,

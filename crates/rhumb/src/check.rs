@@ -36,6 +36,7 @@ pub fn check(
         dialect: job.dialect,
         filament_area: job.plan.filament.area,
         multiplier: job.plan.filament.multiplier,
+        restart_extra: job.plan.filament.restart_extra,
         coarse: (chord + job.paths.tolerance - USUAL_TOLERANCE).max(0.0),
         volume_per_second: job.plan.filament.volume_per_second,
         mesh: part,

@@ -5,24 +5,15 @@
 
 use mesh::mesh::Mesh;
 use mesh::topology::Solid;
-use nalgebra::Rotation3;
+use nalgebra::{Rotation3, Vector3};
 use slicer::layer::{Filled, PathParams};
 
+use crate::objects::Extent;
+use crate::own::Own;
 use crate::place::Placed;
 use crate::settings::Job;
 use crate::stack::Stack;
 use crate::stages::Stage;
-
-/// How one model is filled other than the rest.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Own {
-    /// Which model of the command line, counted from 0.
-    pub model: usize,
-    /// How it is filled.
-    pub paths: PathParams,
-    /// The same, for people.
-    pub said: Vec<String>,
-}
 
 /// Models that are filled alike.
 pub(crate) struct Group {
@@ -51,9 +42,9 @@ pub(crate) fn groups(
             each.len() - 1
         });
         let mesh = &mut each[k].1;
-        let (object, first) = (object.mesh(all), mesh.vertices.len() as u32);
-        mesh.vertices.extend(object.vertices.iter().map(|p| upright * p));
-        mesh.triangles.extend(object.triangles.iter().map(|corners| corners.map(|v| v + first)));
+        let mut object = object.extent.mesh(all);
+        object.vertices.iter_mut().for_each(|p| *p = upright * *p);
+        Extent::added(mesh, &object, &Vector3::zeros());
     }
     let group = |(paths, mesh): (PathParams, Mesh)| {
         let mut job = job.clone();

@@ -53,6 +53,7 @@ pub mod models;
 pub mod objects;
 pub mod output;
 pub mod overhang;
+pub mod own;
 pub mod page;
 pub mod pipeline;
 pub mod place;

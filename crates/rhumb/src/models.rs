@@ -11,17 +11,19 @@ use geom::circle::{Circle, smallest_around};
 use geom::region::Region;
 use mesh::health::{Health, solid_from_soup};
 use mesh::mesh::Mesh;
-use mesh::model::{self, Format, Given};
-use mesh::note::Note;
+use mesh::model::{self, Format, Given, OwnSettings};
+use mesh::note::{self, Note};
 use mesh::orient::OrientParams;
 use mesh::place::{Placement, reference_azimuth};
+use mesh::soup::Soup;
+use mesh::split;
 use mesh::topology::Solid;
 use nalgebra::{Point2, Rotation3, Vector2, Vector3};
 
 use crate::failure::Failure;
-use crate::groups::Own;
-use crate::objects::{Object, hull, outline, overlap};
-use crate::place::{Placed, Pose, Wish, place, whole_places};
+use crate::objects::{Extent, Object, hull, outline, overlap};
+use crate::own::Own;
+use crate::place::{Placed, Pose, Wish, place, place_together, whole_places};
 
 /// A file of a model.
 #[derive(Debug, Clone, Copy)]
@@ -45,11 +47,22 @@ pub struct Arrangement {
     pub copies: usize,
     /// Models that are filled other than the rest.
     pub own: Vec<Own>,
+    /// Whether settings that a file holds for single objects are taken over.
+    pub file_settings: bool,
+    /// Whether the bodies of a model are models each, where the model has them.
+    pub split: bool,
 }
 
 impl Default for Arrangement {
     fn default() -> Self {
-        Self { at: Vec::new(), gap: 6.0, copies: 1, own: Vec::new() }
+        Self {
+            at: Vec::new(),
+            gap: 6.0,
+            copies: 1,
+            own: Vec::new(),
+            file_settings: false,
+            split: false,
+        }
     }
 }
 
@@ -97,6 +110,114 @@ pub fn repaired(given: &Given, name: &Path) -> Result<(Solid, Health), Failure> 
     Ok((solid, health.with_notes(&given.notes)))
 }
 
+/// What a file holds, made ready to be placed.
+pub struct File {
+    /// The objects: several have places with regard to each other.
+    pub objects: Vec<Whole>,
+    /// What is known of their meshes, each with a name for people.
+    pub healths: Vec<(String, Health)>,
+    /// How they are laid down.
+    pub wish: Wish,
+}
+
+/// A model that encloses something.
+pub struct Whole {
+    /// What it is called.
+    pub name: String,
+    /// Its surface.
+    pub solid: Solid,
+    /// The settings that its file has for it alone.
+    pub settings: Option<OwnSettings>,
+}
+
+/// Objects of one file that are looked at each for itself: no plate holds more, and each pair of them is
+/// compared. The objects of a file with more are one model.
+const MOST_OBJECTS: usize = 500;
+
+/// Makes solids of what a file holds, one for each of its objects. One of several that encloses nothing
+/// is left out, and told.
+///
+/// # Errors
+///
+/// `NoVolume` or `LimitExceeded`, about the file.
+pub fn file(given: &Given, name: &Path, wish: Wish) -> Result<File, Failure> {
+    let pose = match wish.pose {
+        Pose::Usual => usual_pose(given.objects.len()),
+        pose => pose,
+    };
+    let wish = Wish { pose, ..wish };
+    let file_name = name.file_name().unwrap_or(name.as_os_str()).to_string_lossy();
+    let stem = name.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    if !(2..=MOST_OBJECTS).contains(&given.objects.len()) {
+        let (solid, health) = repaired(given, name)?;
+        let settings = given.objects.first().and_then(|object| object.settings.clone());
+        let settings = settings.filter(|_| given.objects.len() == 1);
+        let objects = vec![Whole { name: stem, solid, settings }];
+        return Ok(File { objects, healths: vec![(file_name.into_owned(), health)], wish });
+    }
+    let mut objects = Vec::new();
+    let mut about = Health::default().with_notes(&given.notes);
+    let mut healths = Vec::new();
+    for (k, object) in given.objects.iter().enumerate() {
+        let name = if object.name.is_empty() { &stem } else { &object.name };
+        let soup = Soup { facets: given.soup.facets[object.facets.clone()].to_vec() };
+        match solid_from_soup(&soup) {
+            Ok((solid, health)) => {
+                let settings = object.settings.clone();
+                objects.push(Whole { name: name.clone(), solid, settings });
+                healths.push((format!("{file_name}, object {} ({name})", k + 1), health));
+            }
+            Err(error) => {
+                let what = format!("object {} ({name}) is left out: {error}", k + 1);
+                about.notes.push(Note::new(note::OBJECT_LEFT_OUT, what));
+            }
+        }
+    }
+    if objects.is_empty() {
+        // As one, so that the message is about the file.
+        repaired(given, name)?;
+    }
+    healths.push((file_name.into_owned(), about));
+    Ok(File { objects, healths, wish })
+}
+
+impl File {
+    /// Takes the models apart into their bodies, which keep their places with regard to each other. With
+    /// more than 500 of them they stay as they are, which is told.
+    #[must_use]
+    pub fn split(self, wish: &Wish) -> Self {
+        let count: usize = self.objects.iter().map(|object| split::count(&object.solid)).sum();
+        let mut healths = self.healths;
+        if count > MOST_OBJECTS {
+            let what =
+                format!("{count} bodies are too many for --split, which takes {MOST_OBJECTS}");
+            if let Some((_, health)) = healths.last_mut() {
+                health.notes.push(Note::new(note::NOT_SPLIT, what));
+            }
+            return Self { objects: self.objects, healths, wish: self.wish };
+        }
+        let parts = |object: Whole| {
+            if split::count(&object.solid) < 2 {
+                return vec![object];
+            }
+            let bodies = split::bodies(&object.solid);
+            let Whole { name, settings, .. } = object;
+            let whole = |body| Whole {
+                name: name.clone(),
+                solid: Solid::new(body),
+                settings: settings.clone(),
+            };
+            bodies.into_iter().map(whole).collect()
+        };
+        let pose = match wish.pose {
+            Pose::Usual => usual_pose(count),
+            pose => pose,
+        };
+        let wish = Wish { pose, ..self.wish };
+        Self { objects: self.objects.into_iter().flat_map(parts).collect(), healths, wish }
+    }
+}
+
 fn unusable(class: &'static str, error: &dyn std::error::Error, hint: Option<String>) -> Failure {
     let failure = Failure::new(class, error.to_string());
     match hint {
@@ -105,44 +226,41 @@ fn unusable(class: &'static str, error: &dyn std::error::Error, hint: Option<Str
     }
 }
 
-/// Lays several solids down, each as is wished, and puts them on the bed together, as one solid. The
-/// place that is wished for the first is that of the middle of all. Two that overlap as far as their
-/// outlines from above tell are told, counted from 1.
+/// Lays the models of several files down, each file as is wished, and puts them on the bed together, as
+/// one solid. The place that is wished for the first is that of the middle of all. Two models that overlap
+/// as far as their outlines from above tell are told, counted from 1.
 ///
 /// # Errors
 ///
 /// As [`place`].
 pub fn arrange(
-    solids: Vec<(String, Solid, Wish)>,
+    files: Vec<File>,
     arrangement: &Arrangement,
     orient: &OrientParams,
 ) -> Result<(Placed, Option<[usize; 2]>), Failure> {
-    let mut parts = Vec::new();
-    let aside = solids.first().map_or(Point2::origin(), |(_, _, wish)| wish.centre);
-    for (model, (name, solid, wish)) in solids.into_iter().enumerate() {
-        let part = place(solid, &Wish { centre: Point2::origin(), ..wish }, orient)?;
-        parts.extend(std::iter::repeat_n((model, name, part), arrangement.copies));
+    let aside = files.first().map_or(Point2::origin(), |file| file.wish.centre);
+    let (mut parts, mut before) = (Vec::new(), 0);
+    for file in files {
+        let n_models = file.objects.len();
+        parts.extend(std::iter::repeat_n(laid(file, before, orient)?, arrangement.copies));
+        before += n_models;
     }
     let centres = if arrangement.at.is_empty() {
-        let radii: Vec<f64> = parts.iter().map(|(_, _, part)| part.reach).collect();
+        let radii: Vec<f64> = parts.iter().map(|part| part.placed.reach).collect();
         packed(&radii, arrangement.gap)
     } else {
         arrangement.at.clone()
     };
     let mut all = Mesh::default();
     let (mut objects, mut rests) = (Vec::new(), Vec::new());
-    for ((model, name, part), centre) in parts.into_iter().zip(centres) {
-        let (first, first_facet) = (all.vertices.len(), all.triangles.len());
+    for (part, centre) in parts.into_iter().zip(centres) {
         let aside = Vector3::new(centre.x + aside.x, centre.y + aside.y, 0.0);
-        let mesh = part.solid.into_mesh();
-        all.vertices.extend(mesh.vertices.iter().map(|p| p + aside));
-        let moved = mesh.triangles.iter().map(|corners| corners.map(|v| v + first as u32));
-        all.triangles.extend(moved);
-        let vertices = first..all.vertices.len();
-        let triangles = first_facet..all.triangles.len();
-        let outline = Region::default();
-        objects.push(Object { name, model, vertices, triangles, outline });
-        rests.push(part.rest);
+        let whole = Extent::added(&mut all, part.placed.solid.mesh(), &aside);
+        for (name, model, extent) in part.models {
+            let extent = extent.behind(&whole);
+            objects.push(Object { name, model, extent, outline: Region::default() });
+            rests.push(part.placed.rest);
+        }
     }
     let azimuth = whole_places(reference_azimuth(&all));
     let reach = all.vertices.iter().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
@@ -152,16 +270,41 @@ pub fn arrange(
     Ok((Placed { solid, placement, rest: None, azimuth, reach, objects, rests }, overlap))
 }
 
+/// The models of one file, laid down.
+#[derive(Clone)]
+struct Laid {
+    placed: Placed,
+    /// Name, number and extent of each.
+    models: Vec<(String, usize, Extent)>,
+}
+
+/// Lays the models of a file down; `before` are those of the files before it.
+fn laid(file: File, before: usize, orient: &OrientParams) -> Result<Laid, Failure> {
+    let wish = Wish { centre: Point2::origin(), ..file.wish };
+    let (names, mut solids): (Vec<_>, Vec<_>) =
+        file.objects.into_iter().map(|object| (object.name, object.solid)).unzip();
+    let (placed, extents) = if solids.len() == 1 {
+        let placed = place(solids.remove(0), &wish, orient)?;
+        let extent = Extent::of(placed.solid.mesh());
+        (placed, vec![Some(extent)])
+    } else {
+        place_together(solids, &wish, orient)?
+    };
+    let numbered = names.into_iter().zip(before..).zip(extents);
+    let models = numbered.filter_map(|((name, model), extent)| Some((name, model, extent?)));
+    Ok(Laid { placed, models: models.collect() })
+}
+
 /// Finds the outlines of objects, seen from above, and two of them, counted from 1, that overlap. An
 /// object whose box no other reaches into has the hull of its outline.
 fn find_outlines(all: &Mesh, objects: &mut [Object]) -> Option<[usize; 2]> {
     let boxes: Vec<Bounds> =
-        objects.iter().map(|o| Bounds::of(&all.vertices[o.vertices.clone()])).collect();
+        objects.iter().map(|o| Bounds::of(&all.vertices[o.extent.vertices.clone()])).collect();
     let meets = |a: &Bounds, b: &Bounds| {
         (0..2).all(|k| a.min[k] < b.max[k] - TOUCHING_MM && b.min[k] < a.max[k] - TOUCHING_MM)
     };
     for (i, object) in objects.iter_mut().enumerate() {
-        let part = object.mesh(all);
+        let part = object.extent.mesh(all);
         let is_alone = (0..boxes.len()).all(|j| j == i || !meets(&boxes[i], &boxes[j]));
         object.outline = if is_alone { hull(&part) } else { outline(&part) };
     }
@@ -180,7 +323,7 @@ pub fn usual_pose(objects: usize) -> Pose {
 
 /// Returns what is known of several models as of one.
 #[must_use]
-pub fn together(mut each: Vec<(&Path, Health)>, copies: usize) -> Health {
+pub fn together(mut each: Vec<(String, Health)>, copies: usize) -> Health {
     if each.len() == 1 && copies == 1 {
         return each.remove(0).1;
     }
@@ -202,7 +345,6 @@ pub fn together(mut each: Vec<(&Path, Health)>, copies: usize) -> Health {
         all.volume_mm3 += copies as f64 * health.volume_mm3;
         all.area_before_mm2 += copies as f64 * health.area_before_mm2;
         all.area_mm2 += copies as f64 * health.area_mm2;
-        let name = name.file_name().unwrap_or(name.as_os_str()).to_string_lossy();
         let named = |note: &Note| Note::new(note.code, format!("{name}: {}", note.message));
         all.notes.extend(health.notes.iter().map(named));
     }

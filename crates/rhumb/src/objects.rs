@@ -6,25 +6,33 @@ use geom::circle::convex_hull;
 use geom::grid::mm;
 use geom::region::{Fill, Region};
 use mesh::mesh::Mesh;
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector3};
 
-/// One of several models, where it stands.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Object {
-    /// What it is called.
-    pub name: String,
-    /// Which model of the command line it is, counted from 0; copies are the same.
-    pub model: usize,
-    /// Its vertices in the mesh of all.
+/// Where one of several meshes is in the mesh of all.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Extent {
+    /// Its vertices.
     pub vertices: Range<usize>,
-    /// Its facets there.
+    /// Its facets.
     pub triangles: Range<usize>,
-    /// Its outline from above, part frame, or, where no other model reaches into the box around it,
-    /// the hull of it.
-    pub outline: Region,
 }
 
-impl Object {
+impl Extent {
+    /// Adds a mesh to others, moved by `shift`.
+    pub fn added(all: &mut Mesh, mesh: &Mesh, shift: &Vector3<f64>) -> Self {
+        let (vertices, triangles) = (all.vertices.len(), all.triangles.len());
+        all.vertices.extend(mesh.vertices.iter().map(|p| p + shift));
+        let first = vertices as u32;
+        all.triangles.extend(mesh.triangles.iter().map(|corners| corners.map(|v| v + first)));
+        Self { vertices: vertices..all.vertices.len(), triangles: triangles..all.triangles.len() }
+    }
+
+    /// Returns the extent of a mesh that is alone.
+    #[must_use]
+    pub fn of(mesh: &Mesh) -> Self {
+        Self { vertices: 0..mesh.vertices.len(), triangles: 0..mesh.triangles.len() }
+    }
+
     /// Returns its part of the mesh of all.
     #[must_use]
     pub fn mesh(&self, all: &Mesh) -> Mesh {
@@ -36,6 +44,33 @@ impl Object {
         }
     }
 
+    /// Returns the same in a mesh that has others before it.
+    #[must_use]
+    pub fn behind(&self, before: &Self) -> Self {
+        let (v, t) = (before.vertices.start, before.triangles.start);
+        Self {
+            vertices: self.vertices.start + v..self.vertices.end + v,
+            triangles: self.triangles.start + t..self.triangles.end + t,
+        }
+    }
+}
+
+/// One of several models, where it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Object {
+    /// What it is called.
+    pub name: String,
+    /// Which model it is, counted from 0 in the order of the command line, each object of a 3MF as
+    /// one; copies are the same.
+    pub model: usize,
+    /// Where it is in the mesh of all.
+    pub extent: Extent,
+    /// Its outline from above, part frame, or, where no other model reaches into the box around it,
+    /// the hull of it.
+    pub outline: Region,
+}
+
+impl Object {
     /// Returns the corners of its hull.
     #[must_use]
     pub fn hull(&self) -> Vec<Point2<f64>> {

@@ -28,14 +28,15 @@ use twin::picture::thumbnail::Thumbnail;
 use crate::choice::{Choice, choose};
 use crate::failure::Failure;
 use crate::filling::{Batch, Filling};
-use crate::groups::{Group, Own, groups};
+use crate::groups::{Group, groups};
 use crate::interrupt::Interrupt;
 use crate::levels::{Layout, check_cuts};
-use crate::models::{self, Arrangement, Model};
+use crate::models::{self, Arrangement, File, Model};
 use crate::objects::Object;
 use crate::output;
 use crate::overhang::{Overhang, overhangs};
-use crate::place::{Fit, Placed, Pose, Wish, check_envelope, check_size, place, suspect_units};
+use crate::own::{self, Configured, Own};
+use crate::place::{Fit, Placed, Wish, check_envelope, check_size, place, suspect_units};
 use crate::program_text;
 use crate::progress::Progress;
 use crate::report::{Timings, Warning};
@@ -128,10 +129,11 @@ pub fn slice_all(
 ) -> Result<Outcome, Failure> {
     let job = request.job;
     let mut clock = Stopwatch::start();
-    let Loaded { given, placed, overlap, health, read_ms, repair_ms } =
-        load(request, models, arrangement, &mut clock, watch)?;
+    let loaded = load(request, models, arrangement, &mut clock, watch)?;
+    let Loaded { given, placed, overlap, own, health, read_ms, repair_ms, .. } = loaded;
     let fit = check_envelope(&placed, job)?;
     let mut warnings: Vec<Warning> = health.notes.iter().map(warning).collect();
+    warnings.extend(loaded.warnings);
     warnings.extend(placement_warnings(&given, &placed, fit, job));
     warnings.extend(overlap.map(|[a, b]| Warning {
         code: "ModelsOverlap".to_owned(),
@@ -158,12 +160,12 @@ pub fn slice_all(
     let mut text = Emitter::for_printer(out, job.dialect, &job.printer);
     // On a bed that turns no side is the front: the picture is that of the upright part, too.
     let thumbnail = Thumbnail::draw(&upright);
-    let start = start_with_objects(&placed, &arrangement.own, &job, &mut text);
+    let start = start_with_objects(&placed, &own, &job, &mut text);
     program_text::head(&mut text, request.name, request.made_at, &thumbnail, &start)
         .map_err(written)?;
     let outlines = placed.objects.iter().map(|object| object.outline.clone()).collect();
     let objects = Objects { outlines };
-    let groups = groups(&placed, &turned, &arrangement.own, &job);
+    let groups = groups(&placed, &turned, &own, &job);
     let parts = Parts { all: &upright, groups: &groups, objects: &objects };
     let with = (&job, request.settings);
     let mut printed = layers(&parts, &stages, with, &mut text, watch)?;
@@ -444,6 +446,10 @@ struct Loaded {
     placed: Placed,
     /// Two of several models that overlap.
     overlap: Option<[usize; 2]>,
+    /// Models that are filled other than the rest.
+    own: Vec<Own>,
+    /// What of settings of objects is not taken over.
+    warnings: Vec<Warning>,
     health: Health,
     read_ms: f64,
     repair_ms: f64,
@@ -463,29 +469,53 @@ fn load(
     let given = given.collect::<Result<Vec<_>, _>>()?;
     let read_ms = clock.lap();
     watch.progress.stage("repair", 1);
-    let (mut solids, mut healths) = (Vec::new(), Vec::new());
+    let (mut files, mut healths) = (Vec::new(), Vec::new());
     for (model, given) in models.iter().zip(given) {
         check_size(&given.soup, job)?;
-        let (solid, health) = models::repaired(&given, model.name)?;
-        let is_usual = wish.pose == Pose::Usual;
-        let pose = if is_usual { models::usual_pose(given.objects) } else { wish.pose };
-        let name = model.name.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        solids.push((name, solid, Wish { pose, ..wish }));
-        healths.push((model.name, health));
+        let mut file = models::file(&given, model.name, wish)?;
+        drop(given);
+        if arrangement.split {
+            file = file.split(&wish);
+        }
+        healths.append(&mut file.healths);
+        files.push(file);
     }
     let health = models::together(healths, arrangement.copies);
+    let (own, warnings) = own_settings(&files, arrangement, request.settings)?;
     let repair_ms = clock.lap();
     watch.progress.stage("orient", 1);
-    let is_one = solids.len() == 1
+    let is_one = files.iter().map(|file| file.objects.len()).sum::<usize>() == 1
         && arrangement.copies == 1
         && arrangement.at.is_empty()
-        && arrangement.own.is_empty();
-    let (given, (placed, overlap)) = if is_one && let Some((_, solid, wish)) = solids.pop() {
-        (solid.mesh().bounds(), (place(solid, &wish, &job.orient)?, None))
-    } else {
-        (Bounds::default(), models::arrange(solids, arrangement, &job.orient)?)
+        && own.is_empty();
+    let only = if is_one { files.pop() } else { None };
+    let (given, (placed, overlap)) = match only {
+        Some(File { mut objects, wish, .. }) => {
+            let solid = objects.remove(0).solid;
+            (solid.mesh().bounds(), (place(solid, &wish, &job.orient)?, None))
+        }
+        None => (Bounds::default(), models::arrange(files, arrangement, &job.orient)?),
     };
-    Ok(Loaded { given, placed, overlap, health, read_ms, repair_ms })
+    Ok(Loaded { given, placed, overlap, own, warnings, health, read_ms, repair_ms })
+}
+
+/// The models that are filled other than the rest, and what of it is not taken over.
+fn own_settings(
+    files: &[File],
+    arrangement: &Arrangement,
+    settings: &Settings,
+) -> Result<(Vec<Own>, Vec<Warning>), Failure> {
+    let models = || files.iter().flat_map(|file| &file.objects);
+    own::check_numbers(&arrangement.own, models().count())?;
+    if !arrangement.file_settings {
+        return Ok((arrangement.own.clone(), Vec::new()));
+    }
+    let configured = models().enumerate().filter_map(|(model, object)| {
+        let settings = object.settings.as_ref()?;
+        Some(Configured { model, name: &object.name, settings })
+    });
+    let configured: Vec<_> = configured.collect();
+    own::with_those_of_files(&arrangement.own, &configured, settings)
 }
 
 /// What helps where the machine cannot get to a place of a layer.

@@ -12,7 +12,7 @@ use mesh::topology::Solid;
 use nalgebra::{Point2, Point3, Rotation3, Vector3};
 
 use crate::failure::Failure;
-use crate::objects::Object;
+use crate::objects::{Extent, Object};
 use crate::settings::Job;
 
 /// How the model is laid down.
@@ -181,6 +181,39 @@ pub fn place(solid: Solid, wish: &Wish, orient: &OrientParams) -> Result<Placed,
     let reach = solid.mesh().vertices.iter().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
     let (objects, rests) = (Vec::new(), Vec::new());
     Ok(Placed { solid, placement, rest, azimuth, reach, objects, rests })
+}
+
+/// Lays down several solids that keep their places with regard to each other, as one. Of one that a cut
+/// takes away altogether there is nothing in the result.
+///
+/// # Errors
+///
+/// As [`place`].
+pub fn place_together(
+    solids: Vec<Solid>,
+    wish: &Wish,
+    orient: &OrientParams,
+) -> Result<(Placed, Vec<Option<Extent>>), Failure> {
+    let mut all = Mesh::default();
+    let mut add = |solid: Solid| Extent::added(&mut all, &solid.into_mesh(), &Vector3::zeros());
+    let extents: Vec<Extent> = solids.into_iter().map(&mut add).collect();
+    let placed = place(Solid::new(all), &Wish { cut: None, ..*wish }, orient)?;
+    let Some((height, keep)) = wish.cut else {
+        return Ok((placed, extents.into_iter().map(Some).collect()));
+    };
+    let piece = |extent: &Extent| {
+        let whole = Solid::new(extent.mesh(placed.solid.mesh()));
+        cut_at(&whole, height, keep).map(Solid::into_mesh)
+    };
+    let mut left = Mesh::default();
+    let mut add = |mesh: Mesh| Extent::added(&mut left, &mesh, &Vector3::zeros());
+    let extents = extents.iter().map(|extent| piece(extent).ok().map(&mut add)).collect();
+    if left.triangles.is_empty() {
+        // Of all together nothing is left, either: the message is about them.
+        cut_at(&placed.solid, height, keep)?;
+    }
+    let as_is = Wish { pose: Pose::Keep, turn: 0.0, cut: None, ..*wish };
+    Ok((place(Solid::new(left), &as_is, orient)?, extents))
 }
 
 /// What a cut leaves of a part that stands on the bed.

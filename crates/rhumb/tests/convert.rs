@@ -339,6 +339,21 @@ fn commands_of_the_source_are_kept_whatever_they_look_like() {
 }
 
 #[test]
+fn what_follows_homing_on_its_line_begins_at_home() {
+    let job = job("generic-polar");
+    let moves = |source: &str| {
+        let (text, _) = converted(source, &job, [0.0, 0.0]).unwrap();
+        let is_move = |line: &&str| line.starts_with("G1 ") || line.starts_with("G28");
+        text.lines().filter(is_move).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let rest = "G1 Z0\nG1 X20 Y20 E0 F1200\nG1 X-20 Y20 E3\n";
+    let apart = moves(&format!("G21\nG90\nM82\nG1 X5\nG28\nG28\nG1 X-20\n{rest}"));
+    assert!(apart.contains(&"G1 Z0 F891".to_owned()), "{apart:?}");
+    let together = moves(&format!("G21 G90\nM82\nG1 X5 G28 G28G1 X-20 ; begin\n{rest}"));
+    assert_eq!(together, apart);
+}
+
+#[test]
 fn a_macro_may_home_and_heat() {
     let source = "START_PRINT BED_TEMP=60\nG1 X20 Y0 Z.2 F3000\nM83\nG1 Y5 E.1\nEND_PRINT\n";
     for printer in ["klipper-polar", "generic-polar"] {

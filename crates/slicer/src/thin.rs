@@ -49,6 +49,14 @@ const RIM_STEP_IN_WIDTHS: f64 = 0.6;
 /// Limits of that distance, mm: about the width of the thinnest bead, and half of a wide one.
 const RIM_STEP_MM: [f64; 2] = [0.12, 0.3];
 
+/// Rims with more points than this are those of long places, which change slowly along their way: there
+/// points may lie farther apart, up to [`LONG_STEP`] times. In small places much changes from one to the
+/// next, and a taper that is followed coarsely gets more than it holds.
+const MANY_RIM_POINTS: f64 = 400.0;
+
+/// How many times farther apart points on the rims of the longest places may lie.
+const LONG_STEP: f64 = 2.0;
+
 /// How much an axis may be simplified, mm, in place and in half its width alike.
 const AXIS_TOLERANCE_MM: f64 = 0.01;
 
@@ -116,9 +124,12 @@ fn axes_of_island(
 /// The distance of points on the rim that suits a place.
 fn rim_step(island: &Island) -> f64 {
     let region = Region::from_island(island.clone());
+    let perimeter = region.perimeter();
     // A strip has two long sides.
-    let mean_width = 2.0 * region.area() / region.perimeter();
-    (RIM_STEP_IN_WIDTHS * mean_width).clamp(RIM_STEP_MM[0], RIM_STEP_MM[1])
+    let mean_width = 2.0 * region.area() / perimeter;
+    let step = (RIM_STEP_IN_WIDTHS * mean_width).clamp(RIM_STEP_MM[0], RIM_STEP_MM[1]);
+    let points = perimeter / step;
+    step * (points / MANY_RIM_POINTS).clamp(1.0, LONG_STEP)
 }
 
 /// The ring in mm, with points no farther apart than `step`.

@@ -5,7 +5,7 @@
 //! use twin::verify::{Setup, Verifier};
 //! # fn example(printer: &machine::profile::Printer, mesh: &mesh::mesh::Mesh, text: &str) {
 //! let filament_area = 2.405;
-//! let setup = Setup { printer, dialect: POLAR, filament_area, multiplier: 1.0,
+//! let setup = Setup { printer, dialect: POLAR, filament_area, multiplier: 1.0, restart_extra: 0.0,
 //!                     volume_per_second: 11.0, coarse: 0.0, mesh: Some(mesh), moved: 0.0,
 //!                     solid: false, thorough: false };
 //! let mut verifier = Verifier::new(setup);
@@ -64,6 +64,9 @@ pub struct Setup<'a> {
     pub filament_area: f64,
     /// Filament fed for each that the volume asks for (`extrusion_multiplier`).
     pub multiplier: f64,
+    /// Filament that is fed after a travel beyond what was drawn back before it, mm; less than zero
+    /// where some is left out.
+    pub restart_extra: f64,
     /// How much farther than is usual (0.007 mm) moves may lie from the outlines that they stand
     /// for, mm.
     pub coarse: f64,
@@ -170,7 +173,7 @@ impl<'a> Verifier<'a> {
             speed: Speed::new(printer),
             acceleration: Acceleration::new(printer),
             head: HeadCheck::new(printer).filter(|_| dialect.speaks_of_heads()),
-            continuity: Continuity::default(),
+            continuity: Continuity::with_extra(setup.restart_extra),
             heat: Heat::new(printer),
             surface: Surface::new(printer),
             flow: Flow::new(printer, meant, setup.volume_per_second / setup.multiplier),

@@ -1,5 +1,7 @@
 //! What is known of the magnets and the sensor before anything is measured.
 
+use super::log::shown;
+
 /// Settings of a log, each optional. Their names are those of the lines `# name = value`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Known {
@@ -71,7 +73,7 @@ impl Known {
     }
 
     /// Takes over a line `name = value`; all other remarks are let pass.
-    pub(super) fn read(&mut self, remark: &str) -> Result<(), (&'static str, &'static str)> {
+    pub(super) fn read(&mut self, remark: &str) -> Result<(), Refusal> {
         let Some((key, value)) = remark.split_once('=') else { return Ok(()) };
         let value = value.trim();
         match key.trim() {
@@ -90,8 +92,10 @@ impl Known {
             "cross_sd_mm" => self.cross_sd = sd("cross_sd_mm", value)?,
             "placement_sd_mm" => self.placement_sd = sd("placement_sd_mm", value)?,
             "bed_reversed" => {
-                self.bed_is_reversed =
-                    value.parse().map_err(|_| ("bed_reversed", "is neither true nor false"))?;
+                self.bed_is_reversed = value.parse().map_err(|_| {
+                    let what = format!("= {} is neither true nor false", shown(value));
+                    ("bed_reversed", what)
+                })?;
             }
             _ => {}
         }
@@ -99,12 +103,14 @@ impl Known {
     }
 }
 
-type Refusal = (&'static str, &'static str);
+/// The name of a setting, and what is wrong with it.
+type Refusal = (&'static str, String);
 
 fn within(key: &'static str, value: &str, min: f64, max: f64) -> Result<f64, Refusal> {
-    let value: f64 = value.parse().map_err(|_| (key, "is no number"))?;
+    let value: f64 =
+        value.parse().map_err(|_| (key, format!("= {} is no number", shown(value))))?;
     let in_range = min <= value && value <= max;
-    if in_range { Ok(value) } else { Err((key, "is out of range")) }
+    if in_range { Ok(value) } else { Err((key, format!("= {value:?} is not {min:?} to {max:?}"))) }
 }
 
 fn length(key: &'static str, value: &str) -> Result<f64, Refusal> {
@@ -121,7 +127,12 @@ fn angle(key: &'static str, value: &str) -> Result<f64, Refusal> {
 }
 
 fn count(key: &'static str, value: &str, least: u32) -> Result<u32, Refusal> {
-    let value: u32 = value.parse().map_err(|_| (key, "is no whole number"))?;
+    let value: u32 =
+        value.parse().map_err(|_| (key, format!("= {} is no whole number", shown(value))))?;
     let in_range = least <= value && value <= MOST_MAGNETS;
-    if in_range { Ok(value) } else { Err((key, "is out of range")) }
+    if in_range {
+        Ok(value)
+    } else {
+        Err((key, format!("= {value} is not {least} to {MOST_MAGNETS}")))
+    }
 }

@@ -125,7 +125,7 @@ pub enum LogError {
         /// Counted from 1.
         line: usize,
         /// What is wrong with it.
-        what: &'static str,
+        what: String,
     },
     /// A setting out of its range.
     #[error("line {line}: {key} {what}")]
@@ -135,7 +135,7 @@ pub enum LogError {
         /// Its name.
         key: &'static str,
         /// What is wrong with it.
-        what: &'static str,
+        what: String,
     },
 }
 
@@ -170,7 +170,7 @@ pub fn parse(text: &str) -> Result<Log, LogError> {
             match kind {
                 None => kind = Some(header(row).ok_or(LogError::Header { line })?),
                 Some(kind) => {
-                    let wrong = |what| LogError::Row { line, what };
+                    let wrong = |what: String| LogError::Row { line, what };
                     let (s, theta, rest) = place(row).map_err(wrong)?;
                     match (kind, rest.as_slice()) {
                         (Kind::Peaks, []) => peaks.push(Sighting::new(s, theta)),
@@ -182,7 +182,10 @@ pub fn parse(text: &str) -> Result<Log, LogError> {
                             let (is_on, direction) = switching(edge, direction).map_err(wrong)?;
                             edges.push(Edge { s, theta, is_on, direction });
                         }
-                        _ => return Err(wrong("the row has not as many values as the header")),
+                        _ => {
+                            let what = "the row has not as many values as the header";
+                            return Err(wrong(what.to_owned()));
+                        }
                     }
                 }
             }
@@ -236,28 +239,38 @@ fn header(row: &str) -> Option<Kind> {
     }
 }
 
-fn place(row: &str) -> Result<(f64, f64, Vec<&str>), &'static str> {
+fn place(row: &str) -> Result<(f64, f64, Vec<&str>), String> {
     let mut values = row.split(',').map(str::trim);
-    let mut next = |most| values.next().ok_or("the row is too short").and_then(|v| number(v, most));
+    let mut next = |most| {
+        let value = values.next().ok_or_else(|| "the row is too short".to_owned())?;
+        number(value, most)
+    };
     let (s, theta_deg) = (next(FARTHEST_MM)?, next(MOST_DEG)?);
     Ok((s, theta_deg.to_radians(), values.collect()))
 }
 
-fn number(text: &str, most: f64) -> Result<f64, &'static str> {
-    let value: f64 = text.parse().map_err(|_| "a value is no number")?;
+fn number(text: &str, most: f64) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("{} is no number", shown(text)))?;
     // What is not a number is in no range.
     let in_range = value.abs() <= most;
-    if in_range { Ok(value) } else { Err("a value is out of range") }
+    if in_range { Ok(value) } else { Err(format!("{value:?} is not within ±{most:?}")) }
 }
 
-fn switching(edge: &str, direction: &str) -> Result<(bool, Direction), &'static str> {
+/// A word of a file, for people.
+pub(super) fn shown(text: &str) -> String {
+    const MOST: usize = 30;
+    let start: String = text.chars().filter(|c| !c.is_control()).take(MOST).collect();
+    format!("\"{start}\"")
+}
+
+fn switching(edge: &str, direction: &str) -> Result<(bool, Direction), String> {
     let is_on = match edge {
         "on" => true,
         "off" => false,
-        _ => return Err("an edge is neither on nor off"),
+        _ => return Err(format!("the edge {} is neither on nor off", shown(edge))),
     };
-    let direction =
-        Direction::from_word(direction).ok_or("a direction is none of cw, ccw, in, out")?;
+    let direction = Direction::from_word(direction)
+        .ok_or_else(|| format!("the direction {} is none of cw, ccw, in, out", shown(direction)))?;
     Ok((is_on, direction))
 }
 

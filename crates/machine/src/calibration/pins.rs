@@ -18,6 +18,7 @@
 //! width of the bead.
 
 use super::fit::Estimate;
+use super::log::shown;
 
 /// The pins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,7 +79,7 @@ pub enum PinsError {
         /// Counted from 1.
         line: usize,
         /// What is wrong.
-        what: &'static str,
+        what: String,
     },
     /// One of the four measures has no reading.
     #[error("there is no reading {0}")]
@@ -96,6 +97,9 @@ pub enum PinsError {
     Radii,
 }
 
+/// No caliper shows more, mm.
+const MOST_MM: f64 = 10_000.0;
+
 /// A print never shrinks or grows by more.
 const MOST_SHRINKAGE: f64 = 0.05;
 
@@ -109,20 +113,24 @@ pub fn parse(text: &str, artefact: &Artefact) -> Result<Vec<Distance>, PinsError
     let mut distances = Vec::new();
     let mut has_header = false;
     for (index, row) in text.trim_start_matches('\u{feff}').lines().enumerate() {
-        let wrong = |what| PinsError::Row { line: index + 1, what };
+        let wrong = |what: String| PinsError::Row { line: index + 1, what };
         let values: Vec<&str> = row.split(',').map(str::trim).collect();
         match values.as_slice() {
             [""] => {}
             [first, ..] if first.starts_with('#') => {}
             ["from", "to", "over_mm", "between_mm"] if !has_header => has_header = true,
-            _ if !has_header => return Err(wrong("the header is not from,to,over_mm,between_mm")),
+            _ if !has_header => {
+                return Err(wrong("the header is not from,to,over_mm,between_mm".to_owned()));
+            }
             [from, to, over, between] => {
-                let of = measure(from, to)
-                    .ok_or_else(|| wrong("no distance of the artefact goes by these pins"))?;
+                let of = measure(from, to).ok_or_else(|| {
+                    let pins = format!("{} to {}", shown(from), shown(to));
+                    wrong(format!("no distance of the artefact goes from {pins}"))
+                })?;
                 let mm = middle(over, between, artefact.pin).map_err(wrong)?;
                 distances.push(Distance { of, mm });
             }
-            _ => return Err(wrong("a row has four values")),
+            _ => return Err(wrong("a row has four values".to_owned())),
         }
     }
     Ok(distances)
@@ -148,20 +156,24 @@ fn measure(from: &str, to: &str) -> Option<Measure> {
     }
 }
 
-fn middle(over: &str, between: &str, pin: f64) -> Result<f64, &'static str> {
-    let read = |text: &str| -> Result<Option<f64>, &'static str> {
+fn middle(over: &str, between: &str, pin: f64) -> Result<f64, String> {
+    let read = |text: &str| -> Result<Option<f64>, String> {
         if text.is_empty() {
             return Ok(None);
         }
-        let value: f64 = text.parse().map_err(|_| "a reading is no number")?;
-        let in_range = 0.0 < value && value < 10_000.0;
-        if in_range { Ok(Some(value)) } else { Err("a reading is out of range") }
+        let value: f64 = text.parse().map_err(|_| format!("{} is no reading", shown(text)))?;
+        let in_range = 0.0 < value && value < MOST_MM;
+        if in_range {
+            Ok(Some(value))
+        } else {
+            Err(format!("{value:?} mm is not 0 to {MOST_MM:?}"))
+        }
     };
     match (read(over)?, read(between)?) {
         (Some(over), Some(between)) => Ok((over + between) / 2.0),
         (Some(over), None) => Ok(over - 2.0 * pin),
         (None, Some(between)) => Ok(between + 2.0 * pin),
-        (None, None) => Err("a row has no reading"),
+        (None, None) => Err("a row has no reading".to_owned()),
     }
 }
 

@@ -42,7 +42,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Given, ModelError> {
         let what = "there is neither a vertex nor a face in it".to_owned();
         return Err(ModelError::Malformed { format: "OBJ", what });
     }
-    Ok(Given { soup, objects: 1, notes: Vec::new() })
+    Ok(Given { objects: super::alone(&soup), soup, notes: Vec::new() })
 }
 
 /// The lines of a text, without comments.

@@ -6,17 +6,18 @@
 //! out, and so are places that are not to be printed. Document types are refused, so there are no
 //! entities and nothing is fetched; what the package holds for other programs is not looked at.
 
+mod config;
 mod part;
-mod volumes;
 
 use super::archive::Archive;
-use super::{Embedded, Given, ModelError, facet};
+use super::{Built, Embedded, Given, ModelError, facet};
 use crate::note::{self, Note};
 use crate::soup::Soup;
+use config::Config;
 use part::{Component, Object, Part, Shape, Transform};
 use std::collections::BTreeMap;
 use std::io::Read;
-use volumes::LeftOut;
+use std::ops::Range;
 
 /// Where the model of a package is, unless its relationships say otherwise.
 const USUAL: &str = "3D/3dmodel.model";
@@ -32,15 +33,18 @@ const MOST_FACETS: usize = 20_000_000;
 pub(super) fn read(bytes: &[u8]) -> Result<Given, ModelError> {
     let archive = Archive::of(bytes).map_err(malformed)?;
     let root = part::root(&archive)?.unwrap_or_else(|| USUAL.to_owned());
-    let left_out = LeftOut::of(&archive);
-    let mut package = Package { archive, parts: BTreeMap::new(), left_out };
+    let config = Config::of(&archive);
+    let mut package = Package { archive, parts: BTreeMap::new(), config };
     package.load(&root)?;
     let build = package.parts[&root].build.clone();
     let mut placed = Placed { most: MOST_FACETS.max(package.n_facets()), ..Placed::default() };
     for item in build.iter().filter(|item| item.is_printed) {
         let before = placed.soup.facets.len();
         package.place(&root, &item.what, &Transform::IDENTITY, 0, &mut placed)?;
-        placed.objects += usize::from(placed.soup.facets.len() > before);
+        let facets = before..placed.soup.facets.len();
+        if !facets.is_empty() {
+            placed.objects.push(package.built(&root, &item.what, facets));
+        }
     }
     let notes = package.notes();
     Ok(Given { soup: placed.soup, objects: placed.objects, notes })
@@ -78,14 +82,14 @@ fn malformed(what: impl Into<String>) -> ModelError {
 struct Package<'a> {
     archive: Archive<'a>,
     parts: BTreeMap<String, Part>,
-    left_out: LeftOut,
+    config: Config,
 }
 
 /// What is placed so far.
 #[derive(Default)]
 struct Placed {
     soup: Soup,
-    objects: usize,
+    objects: Vec<Built>,
     /// How many objects were gone through.
     visits: usize,
     /// The largest number of facets.
@@ -139,12 +143,12 @@ impl Package<'_> {
         match &object.shape {
             Shape::Mesh(mesh) => {
                 // Runs are of the objects that the build places.
-                let left_out = Some(&self.left_out).filter(|_| depth == 0);
-                mesh_at(mesh, &to_build.of_unit(here.mm), id, left_out, placed)
+                let config = Some(&self.config).filter(|_| depth == 0);
+                mesh_at(mesh, &to_build.of_unit(here.mm), id, config, placed)
             }
             Shape::Components(components) => {
                 let mut components = components.clone();
-                components.retain(|c| !self.left_out.has_component(id, c.object));
+                components.retain(|c| !self.config.leaves_out_component(id, c.object));
                 components.iter().try_for_each(|component| {
                     self.place(part, component, &to_build, depth + 1, placed)
                 })
@@ -152,16 +156,24 @@ impl Package<'_> {
         }
     }
 
+    /// What is known of a place of the build that is made of these facets.
+    fn built(&self, root: &str, what: &Component, facets: Range<usize>) -> Built {
+        let part = what.part.as_deref().unwrap_or(root);
+        let object = self.parts.get(part).and_then(|part| part.objects.get(&what.object));
+        let name = object.map_or_else(String::new, |object| super::shown(object.name.as_bytes()));
+        Built { name, facets, settings: self.config.settings(what.object) }
+    }
+
     /// What the user should know of the package.
     fn notes(&self) -> Vec<Note> {
         let mut notes = Vec::new();
         let mut names = self.parts.values().flat_map(|part| part.objects.values());
-        if names.any(|object| object.has_odd_name) {
-            let what = "the name of an object holds line ends or other control characters; names of \
-                        objects are not used";
+        if names.any(|object| object.name.contains(char::is_control)) {
+            let what = "the name of an object holds line ends or other control characters; they are \
+                        left out";
             notes.push(Note::new(note::NAME_SANITIZED, what.to_owned()));
         }
-        if !self.left_out.is_empty() {
+        if self.config.leaves_out() {
             let what = "volumes that change settings, take material away or are for supports are \
                         left out";
             notes.push(Note::new(note::VOLUMES_LEFT_OUT, what.to_owned()));
@@ -175,7 +187,8 @@ impl Package<'_> {
         };
         if self.archive.names().any(is_settings) {
             let what = "settings of another slicer in the file are not taken over: only the shapes \
-                        and their places are (rhumb profile import makes profiles of them)";
+                        and their places are (rhumb profile import makes profiles of them, and \
+                        --file-settings takes those of single objects)";
             notes.push(Note::new(note::EMBEDDED_SETTINGS_IGNORED, what.to_owned()));
         }
         notes
@@ -187,7 +200,7 @@ fn mesh_at(
     mesh: &part::Mesh,
     to_build: &Transform,
     id: u32,
-    left_out: Option<&LeftOut>,
+    config: Option<&Config>,
     placed: &mut Placed,
 ) -> Result<(), ModelError> {
     if placed.soup.facets.len() + mesh.triangles.len() > placed.most {
@@ -200,7 +213,7 @@ fn mesh_at(
     let is_mirrored = to_build.determinant() < 0.0;
     placed.soup.facets.reserve(mesh.triangles.len());
     for (number, &[a, b, c]) in mesh.triangles.iter().enumerate() {
-        if left_out.is_some_and(|left_out| left_out.has_triangle(id, number)) {
+        if config.is_some_and(|config| config.leaves_out_triangle(id, number)) {
             continue;
         }
         let [b, c] = if is_mirrored { [c, b] } else { [b, c] };

@@ -29,7 +29,7 @@ impl Resampler {
     /// One move for as many strokes as possible, at least two, and their number: circles about the
     /// axis and spirals are straight in joint space, however finely their strokes are cut.
     pub(super) fn long_move(&mut self, strokes: &[Stroke]) -> Option<(usize, Leg)> {
-        let is_off_line = self.meant != self.over_bed;
+        let is_off_line = self.meant.over_bed != self.over_bed;
         let is_joints = self.params.dialect.space == Space::Joints;
         if !is_joints || strokes[0].kind != Kind::Print || is_off_line {
             return None;
@@ -72,10 +72,9 @@ impl Resampler {
         let mut legs = Vec::new();
         let target = &targets[good - 1];
         let to = self.joints_at(target).ok()?;
-        let end = target.over_bed;
         self.push(Kind::Print, to, target, &mut legs).ok()?;
         let leg = legs.pop()?;
-        self.meant = end;
+        self.meant = *target;
         let filament = strokes[..good].iter().map(|stroke| stroke.filament).sum();
         let filament = self.with_owed(Kind::Print, filament, true);
         // No stroke may be passed faster than its own flow allows.

@@ -77,6 +77,39 @@ fn a_line_that_grazes_the_axis_goes_round_it() {
 }
 
 #[test]
+fn lines_over_the_tip_of_a_cone_stay_on_it_round_the_axis() {
+    let mut near_only = printer();
+    near_only.rail.min = 0.0;
+    near_only.axis_clearance = 0.1;
+    let on_cone = |stroke: Stroke| {
+        let z = 5.0 - 0.8 * stroke.to.xy().coords.norm();
+        Stroke { to: Point3::new(stroke.to.x, stroke.to.y, z), ..stroke }
+    };
+    // Past the axis, over it with a corner on it, from it, to it, and with two corners beside it.
+    let ways: [&[[f64; 2]]; 5] = [
+        &[[-1.0, 0.0], [0.0, 0.0], [0.2, 0.9]],
+        &[[-0.3, 0.05], [-0.2, 0.05], [-0.13, 0.05], [-0.05, 0.05], [0.0, 0.02], [0.04, 0.3]],
+        &[[0.0, 0.0], [0.0, -2.0]],
+        &[[0.7, 0.7], [0.0, 0.01]],
+        &[[0.02, -0.01], [0.0, 0.04], [0.0, 0.3]],
+    ];
+    for way in ways {
+        let mut resampler = Resampler::new(&near_only, PARAMS);
+        let begin = on_cone(travel(way[0][0], way[0][1]));
+        let mut strokes = vec![begin];
+        strokes.push(Stroke { kind: Kind::Filament, filament: 0.8, ..begin });
+        strokes.extend(way[1..].iter().map(|&[x, y]| on_cone(print(x, y))));
+        let legs = legs(&mut resampler, &strokes);
+        let first = legs.iter().rposition(|leg| leg.kind == Kind::Travel).unwrap();
+        for leg in &legs[first..] {
+            let off = leg.at.z - (5.0 - 0.8 * leg.at.xy().coords.norm());
+            // Lines that are straight in space and pass the axis aside lie in the cone.
+            assert!(off.abs() < 0.003, "{way:?}: {off} at {}", leg.at);
+        }
+    }
+}
+
+#[test]
 fn a_line_through_the_axis_turns_nothing_where_the_carriage_can_pass() {
     let mut resampler = Resampler::new(&printer(), PARAMS);
     legs(&mut resampler, &[travel(0.0, 15.0), travel(-10.0, 0.0)]);

@@ -1,13 +1,11 @@
 //! `rhumb slice`: the main job.
 
-use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use machine::gcode::dialect::{CARTESIAN, Space};
 use machine::gcode::{Dialect, ELAPSED};
 use mesh::model::Format;
-use slicer::layer::PathParams;
 use slicer::level::Snap;
 use twin::verify::Verdict;
 
@@ -17,16 +15,16 @@ use crate::calibration;
 use crate::check::{check, refusal};
 use crate::clock;
 use crate::failure::Failure;
-use crate::groups::Own;
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::models::{Arrangement, Model};
 use crate::output::{self, Output};
+use crate::own;
 use crate::pipeline::{self, Outcome, Request, Watch};
 use crate::place::parse_place;
 use crate::progress::{Bars, Progress, Silent};
 use crate::report::Report;
-use crate::settings::{Job, Settings};
+use crate::settings::Job;
 use crate::stopwatch::Stopwatch;
 use crate::summary;
 
@@ -43,7 +41,7 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     job.draws_arcs = draws_arcs(arguments, &job)?;
     let wish = wish(&arguments.place)?;
     let mut arrangement = arrangement(arguments)?;
-    arrangement.own = own_settings(arguments, &settings)?;
+    arrangement.own = own::asked(&arguments.object, &settings)?;
     let target = target(arguments);
     let inputs: Vec<&Path> = arguments.models.iter().map(PathBuf::as_path).collect();
     let bytes = inputs.iter().map(|path| input::read(path)).collect::<Result<Vec<_>, _>>()?;
@@ -247,7 +245,8 @@ fn arrangement(arguments: &Slice) -> Result<Arrangement, Failure> {
     if n_inputs > 1 {
         return Err(Failure::new("Usage", "standard input holds one model".to_owned()));
     }
-    Ok(Arrangement { at, gap, copies, own: Vec::new() })
+    let (file_settings, split) = (arguments.file_settings, arguments.split);
+    Ok(Arrangement { at, gap, copies, own: Vec::new(), file_settings, split })
 }
 
 /// Whether runs of lines become arcs.
@@ -262,48 +261,6 @@ fn draws_arcs(arguments: &Slice, job: &Job) -> Result<bool, Failure> {
         return Err(Failure::new("ConfigConflict", what).hint(hint));
     }
     Ok(arguments.arcs)
-}
-
-/// The models that are filled other than the rest.
-fn own_settings(arguments: &Slice, settings: &Settings) -> Result<Vec<Own>, Failure> {
-    let mut each: BTreeMap<usize, (Settings, Vec<String>)> = BTreeMap::new();
-    let n_models = arguments.models.len();
-    for text in &arguments.object {
-        let wrong = || Failure::new("Usage", format!("--object {text:?} is not N:KEY=VALUE"));
-        let (number, pair) = text.split_once(':').ok_or_else(wrong)?;
-        let number: usize = number.trim().parse().map_err(|_| wrong())?;
-        if number == 0 || number > n_models {
-            let what = format!("--object {text:?}: there are models 1 to {n_models}");
-            return Err(Failure::new("Usage", what));
-        }
-        let (own, said) = each.entry(number - 1).or_insert_with(|| (settings.clone(), Vec::new()));
-        own.set(pair)?;
-        said.push(pair.to_owned());
-    }
-    if each.is_empty() {
-        return Ok(Vec::new());
-    }
-    let common = Job::resolve(settings)?;
-    let resolved = |(model, (own, said)): (usize, (Settings, Vec<String>))| {
-        let own = Job::resolve(&own)?;
-        let paths = own.paths;
-        // What does not lie in an object alone is the same for all.
-        let same = PathParams {
-            adhesion: common.paths.adhesion,
-            first_layer: common.paths.first_layer,
-            vase: common.paths.vase,
-            tolerance: common.paths.tolerance,
-            ..paths
-        };
-        if same != paths || (Job { paths: common.paths, ..own }) != common {
-            let number = model + 1;
-            let what = format!("--object {number}: {} concern the whole print", said.join(", "));
-            return Err(Failure::new("ConfigConflict", what)
-                .hint("a model alone may have its own walls, skins, infill and moved outlines"));
-        }
-        Ok(Own { model, paths, said })
-    };
-    each.into_iter().map(resolved).collect()
 }
 
 fn fill(mut file: Output, bytes: &[u8]) -> Result<(), Failure> {

@@ -68,6 +68,8 @@ pub(super) struct Batches<'a, R> {
     layers: Layers,
     watch: Watch,
     line: Line,
+    /// Commands of the line that are in the batch before this one.
+    taken: usize,
     has_begun: bool,
     is_done: bool,
 }
@@ -86,6 +88,7 @@ impl<'a, R: BufRead> Batches<'a, R> {
             layers: Layers::default(),
             watch: Watch::new(printer, job.plan.filament.area, request.keeps_dangerous),
             line: Line::default(),
+            taken: 0,
             has_begun: false,
             is_done: false,
         }
@@ -104,7 +107,9 @@ impl<'a, R: BufRead> Batches<'a, R> {
         }
         let mut batch = Batch::default();
         while !self.is_done {
-            self.is_done = !self.line.read(&mut self.source, self.name)?;
+            if self.taken == 0 {
+                self.is_done = !self.line.read(&mut self.source, self.name)?;
+            }
             let goes_home = !self.is_done && self.take(&mut batch)?;
             if self.is_done || goes_home || self.is_full(&batch) {
                 self.layers.give_up();
@@ -118,19 +123,24 @@ impl<'a, R: BufRead> Batches<'a, R> {
         Ok(None)
     }
 
-    /// Takes the line just read into the batch; returns whether the machine is homed by it.
+    /// Takes the line just read into the batch, or what is left of it; returns whether the machine is homed
+    /// by it, and leaves what follows that.
     fn take(&mut self, batch: &mut Batch) -> Result<bool, Failure> {
         let text = self.line.text();
         let number = self.line.number();
         let (code, comment) = without_comment(&text);
-        if leaves_bracket_open(&text) {
+        if self.taken == 0 && leaves_bracket_open(&text) {
             self.watch.open_bracket(&text, number);
         }
-        let mut goes_home = false;
         let mut is_alone = true;
         let fault = |error: &ReadError| unreadable(self.name, number, error);
-        for command in commands(&code).map_err(|error| fault(&error))? {
+        let mut left = commands(&code).map_err(|error| fault(&error))?.enumerate().peekable();
+        let mut goes_home = false;
+        while let Some((k, command)) = left.next() {
             is_alone = false;
+            if k < self.taken {
+                continue;
+            }
             let (first, from) = (batch.strokes.len(), self.reader.at());
             if self.watch.is_on_card() {
                 self.watch.other(command, number).map_err(|error| fault(&error))?;
@@ -160,10 +170,15 @@ impl<'a, R: BufRead> Batches<'a, R> {
                     self.watch.home(line, number);
                     batch.between.push((first, Between::Home(line.to_owned())));
                     self.reader.homed(self.home);
+                    if left.peek().is_some() {
+                        self.taken = k + 1;
+                        return Ok(true);
+                    }
                     goes_home = true;
                 }
             }
         }
+        self.taken = 0;
         // Remarks on single moves have no place where moves are cut to pieces, and what the source
         // estimated is not true of this machine.
         let kept = comment.filter(|comment| is_alone && !is_estimate(comment));

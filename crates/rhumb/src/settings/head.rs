@@ -7,7 +7,7 @@ use machine::profile::Axis;
 use nalgebra::Vector3;
 use plan::tilt::Tilt;
 
-use super::resolve::Lookup;
+use super::lookup::Lookup;
 use crate::failure::Failure;
 
 /// The head of a printer; `None` where its nozzle always stands upright.

@@ -74,7 +74,10 @@ const NAMES: [(&str, &str); 59] = [
 const OTHER_MEANINGS: [&str; 2] = ["fuzzy_skin", "seam_position"];
 
 /// Values that have other words.
-const WORDS: [(&str, &str, &str); 6] = [
+const WORDS: [(&str, &str, &str); 9] = [
+    ("wall_sequence", "inner wall/outer wall", "inner-outer"),
+    ("wall_sequence", "outer wall/inner wall", "outer-inner"),
+    ("wall_sequence", "inner-outer-inner wall", "inner-outer-inner"),
     ("fill_pattern", "zig-zag", "rectilinear"),
     ("fill_pattern", "line", "rectilinear"),
     ("fill_pattern", "tri-hexagon", "stars"),

@@ -22,12 +22,13 @@ pub struct Imported {
 }
 
 /// Other names of settings; the later of two wins. A filament may override what a printer says.
-const OTHER_NAMES: [(&str, &str); 8] = [
+const OTHER_NAMES: [(&str, &str); 9] = [
     ("max_fan_speed", "fan_speed"),
     ("top_fill_pattern", "solid_fill_pattern"),
     ("retract_length", "retract_length_mm"),
     ("filament_retract_length", "retract_length_mm"),
     ("filament_retract_speed", "retract_speed_mm_per_s"),
+    ("filament_retract_restart_extra", "retract_restart_extra_mm"),
     ("filament_retract_lift", "retract_lift_mm"),
     ("filament_retract_before_travel", "retract_before_travel_mm"),
     ("initial_layer_height", "first_layer_height_mm"),

@@ -1,7 +1,8 @@
 //! The surfaces that layers follow: one for the whole part, or ranges of heights.
 
+use super::lookup::Lookup;
 use super::ranges::{self, Word};
-use super::resolve::{Lookup, conflict};
+use super::resolve::conflict;
 use crate::failure::Failure;
 use crate::ranges::{Follows, Span};
 use crate::stages::LayerKind;

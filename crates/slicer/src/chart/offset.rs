@@ -26,6 +26,7 @@ use geom::offset::{
 use geom::polyline::{distance_to_segment, share_nearest};
 use geom::region::{Fill, Island, Region, Ring, ring_length, signed_area};
 use nalgebra::{Point2, Vector2};
+use std::ops::Range;
 
 use super::{Chart, turned};
 
@@ -312,14 +313,27 @@ fn cut_side(cos: f64, (from, to): (Point2<f64>, Point2<f64>), near: f64, sides: 
     cut_side(cos, (middle, to), near, sides);
 }
 
-/// What a raw ring does at a corner.
-struct Corner {
-    /// The points, in order; none twice.
-    points: Vec<Point2<f64>>,
-    /// Where on the side before the first of them belongs, mm from the corner back.
+/// Where on the sides around it the points that a raw ring takes at a corner belong: the first on the
+/// side before, mm from the corner back, the last on the side after, mm from the corner on.
+#[derive(Clone, Copy)]
+struct Ends {
     before: f64,
-    /// Where on the side after the last belongs, mm from the corner on.
     after: f64,
+}
+
+impl Ends {
+    /// Those of the corner itself.
+    const CORNER: Self = Self { before: 0.0, after: 0.0 };
+}
+
+/// What a raw ring does between a kept side and the kept one before it.
+struct Passage {
+    /// The side.
+    side: usize,
+    /// Its points, in order, none twice, among those of the whole ring.
+    points: Range<usize>,
+    /// Where they belong.
+    ends: Ends,
 }
 
 /// The border of a ring while it is moved.
@@ -363,39 +377,46 @@ impl<'a> Border<'a> {
 
     fn raw_ring(&self) -> Ring {
         let Self { mover, sides, moved, .. } = self;
-        let places: Vec<(&Side, Vec<Corner>)> =
-            moved.kept().map(|side| (&sides[side], self.corners_before(side))).collect();
-        let mut raw = Ring::with_capacity(sides.len() + sides.len() / 4);
-        for (k, (side, corners)) in places.iter().enumerate() {
-            raw.extend(corners.iter().flat_map(|corner| &corner.points).map(snap));
-            let (_, next) = &places[(k + 1) % places.len()];
-            let (Some(here), Some(next)) = (corners.last(), next.first()) else { continue };
-            let (Some(from), Some(to)) = (here.points.last(), next.points.first()) else {
-                continue;
-            };
-            let range = (here.after, side.length - next.before);
-            mover.side(side, range, (from, to), &mut raw);
+        let mut points = Vec::with_capacity(sides.len() + sides.len() / 4);
+        let passages: Vec<Passage> =
+            moved.kept().map(|side| self.passage(side, &mut points)).collect();
+        let mut raw = Ring::with_capacity(points.len());
+        for (k, here) in passages.iter().enumerate() {
+            let next = &passages[(k + 1) % passages.len()];
+            raw.extend(points[here.points.clone()].iter().map(snap));
+            let (from, to) = (&points[here.points.end - 1], &points[next.points.start]);
+            let side = &sides[here.side];
+            mover.side(
+                side,
+                (here.ends.after, side.length - next.ends.before),
+                (from, to),
+                &mut raw,
+            );
         }
         raw
     }
 
-    /// What the raw ring does between a kept side and the kept one before it.
-    fn corners_before(&self, side: usize) -> Vec<Corner> {
+    /// Appends the points of the raw ring between a kept side and the kept one before it: one at least.
+    fn passage(&self, side: usize, points: &mut Vec<Point2<f64>>) -> Passage {
         let Self { mover, sides, turns, moved } = self;
+        let start = points.len();
         let both_fit = moved.fit_around(side);
         if both_fit && moved.meets_across(side) {
             let before = moved.before(side);
-            return vec![Corner {
-                points: vec![mover.moved(&sides[side], moved.from(side))],
-                before: sides[before].length - moved.to(before),
-                after: moved.from(side),
-            }];
+            points.push(mover.moved(&sides[side], moved.from(side)));
+            let ends =
+                Ends { before: sides[before].length - moved.to(before), after: moved.from(side) };
+            return Passage { side, points: start..points.len(), ends };
         }
         let count = sides.len();
-        let corner = |i: usize| {
-            mover.corner(&sides[(i + count - 1) % count], &sides[i], &turns[i], both_fit)
-        };
-        moved.corners(side).map(corner).collect()
+        let mut ends: Option<Ends> = None;
+        for i in moved.corners(side) {
+            let before = &sides[(i + count - 1) % count];
+            let corner = mover.corner((before, &sides[i]), &turns[i], both_fit, points);
+            ends =
+                Some(Ends { before: ends.map_or(corner.before, |first| first.before), ..corner });
+        }
+        Passage { side, points: start..points.len(), ends: ends.unwrap_or(Ends::CORNER) }
     }
 }
 
@@ -439,31 +460,37 @@ impl Mover<'_> {
             || cos_half * self.curves.longest_miter >= 1.0
     }
 
-    fn corner(&self, before: &Side, after: &Side, turn: &Turn, sides_fit: bool) -> Corner {
-        let apart = |points| Corner { points, before: 0.0, after: 0.0 };
+    /// Appends the points that the raw ring takes at a corner: one at least.
+    fn corner(
+        &self,
+        (before, after): (&Side, &Side),
+        turn: &Turn,
+        sides_fit: bool,
+        points: &mut Vec<Point2<f64>>,
+    ) -> Ends {
         let meet = self.meet(turn);
-        if turn.sin * self.shift > 0.0 {
-            if sides_fit
-                && meet
-                && let Some(corner) = self.crossing(before, after, turn)
-            {
-                return corner;
-            }
-            let [mut points, begin] = turn.normals.map(|normal| self.way(&turn.at, &normal));
-            points.reverse();
+        let runs_into_itself = turn.sin * self.shift > 0.0;
+        if meet
+            && (sides_fit || !runs_into_itself)
+            && let Some((at, ends)) = self.crossing(before, after, turn)
+        {
+            points.push(at);
+            return ends;
+        }
+        if runs_into_itself {
+            let [end, begin] = turn.normals.map(|normal| self.way(&turn.at, &normal));
+            points.extend(end.iter().rev());
             points.push(turn.at);
             points.extend(begin);
-            return apart(points);
+        } else {
+            self.arc(turn, points);
         }
-        if meet && let Some(corner) = self.crossing(before, after, turn) {
-            return corner;
-        }
-        apart(self.arc(turn))
+        Ends::CORNER
     }
 
-    /// The geodesic circle about a corner, from the image of the side before to that of the side
+    /// Appends the geodesic circle about a corner, from the image of the side before to that of the side
     /// after.
-    fn arc(&self, turn: &Turn) -> Vec<Point2<f64>> {
+    fn arc(&self, turn: &Turn, points: &mut Vec<Point2<f64>>) {
         let angle = turn.sin.atan2(turn.cos);
         let largest_step = 2.0 * (1.0 - self.tolerance() / self.shift.abs()).acos();
         let pieces = (angle.abs() / largest_step).ceil().max(1.0);
@@ -476,7 +503,7 @@ impl Mover<'_> {
             Vector2::new(first.x * cos - first.y * sin, first.x * sin + first.y * cos) * self.shift
         };
         let s = turn.at.coords.norm();
-        let mut points = vec![self.walk(&turn.at, &spoke(0))];
+        points.push(self.walk(&turn.at, &spoke(0)));
         for k in 1..=pieces as u32 {
             let (old, new) = (spoke(k - 1), spoke(k));
             let passes_behind = s + new.x < 0.0 && old.y * new.y < 0.0;
@@ -485,7 +512,6 @@ impl Mover<'_> {
             }
             points.push(self.walk(&turn.at, &new));
         }
-        points
     }
 
     fn has_apex(&self) -> bool {
@@ -527,7 +553,7 @@ impl Mover<'_> {
 
     /// The crossing of the images of two sides, produced beyond the corner where they drift apart;
     /// `None` when they do not meet nearby.
-    fn crossing(&self, before: &Side, after: &Side, turn: &Turn) -> Option<Corner> {
+    fn crossing(&self, before: &Side, after: &Side, turn: &Turn) -> Option<(Point2<f64>, Ends)> {
         let half = self.shift / (1.0 + turn.cos);
         let from_axis = turn.at.coords.norm();
         let is_clear = !self.has_apex() || from_axis > self.shift.abs();
@@ -538,7 +564,7 @@ impl Mover<'_> {
         if is_clear && (is_slight || is_straight()) {
             let at = self.walk(&turn.at, &((turn.normals[0] + turn.normals[1]) * half));
             let [before, after] = turn.consumed;
-            return Some(Corner { points: vec![at], before, after });
+            return Some((at, Ends { before, after }));
         }
         let cross = before.direction.perp(&after.direction);
         if cross == 0.0 {
@@ -546,7 +572,7 @@ impl Mover<'_> {
         }
         let guess = [before.length - turn.consumed[0], turn.consumed[1]];
         let ([to, from], at) = self.newton(before, after, guess)?;
-        Some(Corner { points: vec![at], before: before.length - to, after: from })
+        Some((at, Ends { before: before.length - to, after: from }))
     }
 
     /// Where the images of two sides that are not neighbours run into each other, mm along either;

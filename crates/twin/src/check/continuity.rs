@@ -59,9 +59,16 @@ pub(crate) struct Continuity {
     /// The way of the line before, when it was of a wall.
     last_wall: Option<Vector3<f64>>,
     worst_deviation: f64,
+    /// What is fed after a travel beyond what was drawn back, mm.
+    extra: f64,
 }
 
 impl Continuity {
+    /// For programs that feed more filament after a travel than was drawn back, or less, mm.
+    pub(crate) fn with_extra(extra: f64) -> Self {
+        Self { extra, ..Self::default() }
+    }
+
     pub(crate) fn segment(&mut self, segment: &Segment, findings: &mut Findings) {
         half_turn(segment, findings);
         if segment.extrudes() && segment.role != Role::Custom {
@@ -164,15 +171,16 @@ impl Continuity {
                 self.drawn -= segment.filament;
                 if self.retractions > 0
                     && segment.role != Role::Custom
-                    && exceeds(-self.drawn, PRIMED)
+                    && exceeds(-self.drawn, PRIMED + self.extra.max(0.0))
                 {
                     let surplus = -self.drawn;
-                    findings.error(NAME, Place::end_of(segment), (surplus, PRIMED), || {
+                    let most = PRIMED + self.extra.max(0.0);
+                    findings.error(NAME, Place::end_of(segment), (surplus, most), || {
                         format!("{surplus:.5} mm more filament is pushed than was drawn back")
                     });
                 }
-                // Purging is no debt, and last places must not add up.
-                if self.drawn < PRIMED {
+                // Purging is no debt, and last places must not add up; nor does what is left out on purpose.
+                if self.drawn < PRIMED - self.extra.min(0.0) {
                     self.drawn = 0.0;
                 }
             }
@@ -266,6 +274,17 @@ mod tests {
         wipe.filament = -0.3;
         assert_eq!(found(&[wipe, alone(-0.5), alone(0.8), line()]), []);
         assert_eq!(found(&[alone(-9.0), alone(-2.0)]), [DRAWN_BACK]);
+        let found = |extra: f64, fed: f64| {
+            let (mut check, mut findings) = (Continuity::with_extra(extra), Findings::default());
+            for segment in
+                [line(), alone(-0.8), alone(fed), line(), alone(-0.8), alone(fed), line()]
+            {
+                check.segment(&segment, &mut findings);
+            }
+            findings.kept().len()
+        };
+        assert_eq!([found(0.1, 0.9), found(-0.1, 0.7), found(0.1, 0.8)], [0; 3]);
+        assert_eq!([found(0.1, 0.95), found(-0.1, 0.65), found(-0.1, 0.9)], [2; 3]);
     }
 
     #[test]

@@ -11,7 +11,7 @@
 use machine::gcode::dialect::Dialect;
 use machine::gcode::dialect::Space;
 use machine::gcode::posed::MOST_WORDS;
-use machine::gcode::{Code, Command, MOST_COLUMNS, SyntaxError, printable};
+use machine::gcode::{Code, Command, MOST_COLUMNS, SyntaxError, parse_line, printable};
 use machine::head::Head;
 
 use crate::finding::{Findings, Place};
@@ -210,6 +210,21 @@ impl Text {
                 format!("{filament} mm of filament in one move, must be under {FILAMENT_ALONE} mm")
             });
         }
+    }
+}
+
+/// Returns the command of a line that no program may hold, because it changes the machine for good, stops
+/// it, or does what is not known here; `None` where there is none. A line of another kind is judged with
+/// the whole program.
+#[must_use]
+pub fn unsafe_command(line: &str) -> Option<String> {
+    let code = parse_line(line).ok()?.command?.code;
+    match code {
+        Code::Numbered(letter, number, part) if !is_motion(code) && !is_on_list(code) => {
+            let part = if part == 0 { String::new() } else { format!(".{part}") };
+            Some(format!("{}{number}{part}", letter as char))
+        }
+        _ => None,
     }
 }
 

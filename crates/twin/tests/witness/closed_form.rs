@@ -33,6 +33,7 @@ fn judged(printer: &Printer) -> Verdict {
         dialect: machine::gcode::dialect::POLAR,
         filament_area: FILAMENT_AREA,
         multiplier: 1.0,
+        restart_extra: 0.0,
         coarse: 0.0,
         volume_per_second: f64::INFINITY,
         mesh: None,

@@ -79,6 +79,7 @@ fn findings(run: &Run, printer: &Printer) -> Vec<String> {
         dialect,
         filament_area: FILAMENT_AREA,
         multiplier: 1.0,
+        restart_extra: 0.0,
         coarse: 0.0,
         volume_per_second: f64::INFINITY,
         mesh: None,

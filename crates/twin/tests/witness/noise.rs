@@ -15,6 +15,7 @@ fn judge(lines: &[Vec<u8>]) -> usize {
             dialect,
             filament_area: FILAMENT_AREA,
             multiplier: 1.0,
+            restart_extra: 0.0,
             coarse: 0.0,
             volume_per_second: f64::INFINITY,
             mesh: Some(&mesh),

@@ -21,8 +21,8 @@ pub(super) struct Part {
 pub(super) struct Object {
     /// Whether it is a model, and not a support or something else.
     pub(super) is_printed: bool,
-    /// Whether its name holds control characters.
-    pub(super) has_odd_name: bool,
+    /// What it is called, whatever that may hold.
+    pub(super) name: String,
     pub(super) shape: Shape,
 }
 
@@ -284,8 +284,7 @@ fn object(element: &BytesStart) -> Result<(u32, Object), ModelError> {
     let kind = text(element, b"type")?;
     let is_printed = kind.is_none_or(|kind| kind == "model");
     let name = text(element, b"name")?.unwrap_or_default();
-    let has_odd_name = name.contains(char::is_control);
-    Ok((id, Object { is_printed, has_odd_name, shape: Shape::Mesh(Mesh::default()) }))
+    Ok((id, Object { is_printed, name, shape: Shape::Mesh(Mesh::default()) }))
 }
 
 fn component(element: &BytesStart) -> Result<Component, ModelError> {

@@ -1,6 +1,7 @@
 use super::*;
 use crate::measure;
 use crate::model::archive::tests::zip;
+use crate::model::{OwnSettings, Slicer};
 use crate::weld::weld;
 
 /// A cube of one unit.
@@ -80,7 +81,7 @@ fn places_and_components_are_followed() {
         "<item objectid=\"2\"/><item objectid=\"2\" transform=\"1 0 0 0 1 0 0 0 1 0 10 0\"/>";
     let text = model("", &(cube(1, "") + pair), build);
     assert_eq!(built(&text), (4.0, [-4.0, 0.0, 0.0], [1.0, 11.0, 1.0]));
-    assert_eq!(read(&packed(&text)).unwrap().objects, 2);
+    assert_eq!(read(&packed(&text)).unwrap().objects.len(), 2);
 }
 
 #[test]
@@ -92,7 +93,7 @@ fn what_is_not_to_be_printed_is_left_out() {
          <item objectid=\"1\" printable=\"0\" {far}/>"
     );
     let given = read(&packed(&model("", &objects, &build))).unwrap();
-    assert_eq!((given.soup.facets.len(), given.objects), (12, 1));
+    assert_eq!((given.soup.facets.len(), given.objects.len()), (12, 1));
     assert!(given.notes.is_empty());
 }
 
@@ -206,4 +207,32 @@ fn modifiers_are_no_part_of_the_shape() {
     let members: [(&str, &[u8]); 2] =
         [(USUAL, text.as_bytes()), ("Metadata/model_settings.config", config.as_bytes())];
     assert_eq!(read(&zip(&members)).unwrap().soup.facets.len(), 12);
+}
+
+#[test]
+fn objects_have_their_names_facets_and_settings() {
+    let objects = cube(1, "name=\"left&#9;wheel\"") + &cube(2, "");
+    let build = "<item objectid=\"1\"/><item objectid=\"2\" transform=\"1 0 0 0 1 0 0 0 1 9 0 0\"/>\
+                 <item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 20 0 0\"/>";
+    let text = model("", &objects, build);
+    let given = |name: &str, config: &str| {
+        read(&zip(&[(USUAL, text.as_bytes()), (name, config.as_bytes())])).unwrap().objects
+    };
+    let prusa = "<config><object id=\"1\"><metadata type=\"object\" key=\"name\" value=\"x\"/><metadata \
+                 type=\"object\" key=\"perimeters\" value=\"4\"/><volume firstid=\"0\" lastid=\"11\">\
+                 <metadata type=\"volume\" key=\"matrix\" value=\"1\"/></volume></object></config>";
+    let built = given("Metadata/Slic3r_PE_model.config", prusa);
+    let names: Vec<&str> = built.iter().map(|built| built.name.as_str()).collect();
+    assert_eq!(names, ["left?wheel", "", "left?wheel"]);
+    let facets: Vec<_> = built.iter().map(|built| built.facets.clone()).collect();
+    assert_eq!(facets, [0..12, 12..24, 24..36]);
+    let pairs = vec![("perimeters".to_owned(), "4".to_owned())];
+    let own = Some(OwnSettings { slicer: Slicer::Prusa, pairs });
+    assert_eq!((&built[0].settings, &built[1].settings, &built[2].settings), (&own, &None, &own));
+    let orca = "<config><object id=\"2\"><metadata key=\"wall_loops\" value=\"5\"/><part id=\"1\" \
+                subtype=\"normal_part\"><metadata key=\"name\" value=\"y\"/></part></object></config>";
+    let built = given("Metadata/model_settings.config", orca);
+    let pairs = vec![("wall_loops".to_owned(), "5".to_owned())];
+    assert_eq!(built[1].settings, Some(OwnSettings { slicer: Slicer::Orca, pairs }));
+    assert_eq!(built[0].settings, None);
 }

@@ -67,6 +67,13 @@ pub(super) const KEYS: &[Key] = &[
     ),
     number(
         Material,
+        "retract_restart_extra_mm",
+        "retract_restart_extra",
+        (0.0, -2.0, 2.0),
+        "filament fed after a travel beyond what was drawn back before it; less than 0 leaves some out",
+    ),
+    number(
+        Material,
         "retract_speed_mm_per_s",
         "retract_speed",
         (35.0, 1.0, 200.0),

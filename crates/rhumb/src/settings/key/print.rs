@@ -157,6 +157,13 @@ pub(super) const KEYS: &[Key] = &[
         program_name: "external_perimeters_first",
         meaning: "whether the outermost wall comes before those behind it",
     },
+    choice(
+        Print,
+        "wall_sequence",
+        &["inner-outer", "outer-inner", "inner-outer-inner"],
+        "in which order walls come on flat layers: from the inside out, from the outside in, or the \
+         outermost after those far inside and before the one behind it",
+    ),
     Key {
         name: "avoid_crossing_perimeters",
         section: Print,
