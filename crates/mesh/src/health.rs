@@ -229,7 +229,7 @@ impl Health {
             degenerate: repaired.degenerate.count,
             duplicate: repaired.duplicate.count,
             guessed: repaired.is_guess(),
-            volume_mm3: solid.shells().iter().map(|s| s.volume_mm3).sum(),
+            volume_mm3: solid.volume_mm3(),
             area_mm2: solid.shells().iter().map(|s| s.area_mm2).sum(),
             ..Self::default()
         }

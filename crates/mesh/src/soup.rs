@@ -21,11 +21,15 @@ impl Soup {
     /// Returns the smallest box around all corners, file units.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
-        let mut bounds = Bounds::default();
+        let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for corner in self.facets.iter().flatten() {
-            bounds.add(&Point3::from(corner.map(f64::from)));
+            for (k, c) in corner.iter().enumerate() {
+                min[k] = min[k].min(*c);
+                max[k] = max[k].max(*c);
+            }
         }
-        bounds
+        let point = |corner: [f32; 3]| Point3::from(corner.map(f64::from));
+        Bounds { min: point(min), max: point(max) }
     }
 
     /// Returns the soup with every coordinate multiplied by `factor`, rounded to `f32` once.

@@ -16,9 +16,10 @@
 mod crowd;
 mod edges;
 
-use edges::Sides;
 pub(crate) use edges::{Edges, runs_up};
+use edges::{Sides, ends_of_half};
 
+use crate::groups::Groups;
 use crate::measure;
 use crate::mesh::{Mesh, MeshFault};
 use crate::note::Tally;
@@ -40,12 +41,11 @@ pub struct Solid {
     nonmanifold_edges: Tally,
 }
 
-/// How triangles are joined. A solid that is moved has the same, so they share it: it is twice as
-/// large as the mesh.
+/// How triangles are joined. A solid that is moved has the same, so they share it: it is larger than
+/// the mesh.
 #[derive(Debug, PartialEq)]
 struct Joins {
     sides: Vec<[u32; 3]>,
-    ends: Vec<[u32; 2]>,
     users: Vec<[u32; 2]>,
     shell_of: Vec<u32>,
 }
@@ -84,10 +84,10 @@ impl Solid {
     /// As [`Solid::new`], for edges that are known.
     pub(crate) fn from_edges(mesh: Mesh, edges: Edges) -> Self {
         let nonmanifold_edges = edges.crowded(&mesh);
-        let Sides { of: sides, ends, users } = edges.into_sides(&mesh);
+        let Sides { of: sides, users } = edges.into_sides(&mesh);
         let open_sides = users.iter().filter(|u| u[1] == NONE).count();
-        let mut joins = Joins { sides, ends, users, shell_of: Vec::new() };
-        let n_shells = joins.find_shells();
+        let (shell_of, n_shells) = shells(sides.len(), &users);
+        let joins = Joins { sides, users, shell_of };
         let mut solid = Self {
             mesh,
             joins: Arc::new(joins),
@@ -120,13 +120,13 @@ impl Solid {
     /// Returns the number of sides.
     #[must_use]
     pub fn n_sides(&self) -> usize {
-        self.joins.ends.len()
+        self.joins.users.len()
     }
 
     /// Returns the two vertices of a side, the lower number first.
     #[must_use]
     pub fn ends(&self, side: u32) -> [u32; 2] {
-        self.joins.ends[side as usize]
+        ends_of_half(&self.mesh, self.joins.users[side as usize][0])
     }
 
     /// Returns the triangle across side `k` of `triangle` and the number of that side there;
@@ -162,6 +162,12 @@ impl Solid {
     #[must_use]
     pub fn shells(&self) -> &[Shell] {
         &self.shells
+    }
+
+    /// Returns the enclosed volume, mm³, as [`measure::volume_mm3`] has it.
+    #[must_use]
+    pub fn volume_mm3(&self) -> f64 {
+        self.shells.iter().map(|shell| shell.volume_mm3).sum()
     }
 
     /// Returns the shell of each triangle.
@@ -236,9 +242,14 @@ impl Solid {
     /// Finds the boxes around the shells anew; volumes and areas stay when a solid moves.
     fn find_boxes(&mut self) {
         self.shells.iter_mut().for_each(|shell| shell.bounds = Bounds::default());
+        // A vertex has six corners on average, nearly always of one shell.
+        let mut seen_by = vec![NONE; self.mesh.vertices.len()];
         for (corners, &shell) in self.mesh.triangles.iter().zip(&self.joins.shell_of) {
             for &v in corners {
-                self.shells[shell as usize].bounds.add(&self.mesh.vertices[v as usize]);
+                if seen_by[v as usize] != shell {
+                    seen_by[v as usize] = shell;
+                    self.shells[shell as usize].bounds.add(&self.mesh.vertices[v as usize]);
+                }
             }
         }
     }
@@ -253,10 +264,8 @@ impl Solid {
             shell.triangles += 1;
             shell.volume_mm3 += measure::cone_volume(&origin, &corners);
             shell.area_mm2 += measure::area_of(&corners);
-            for p in &corners {
-                shell.bounds.add(p);
-            }
         }
+        self.find_boxes();
         for users in self.joins.users.iter().filter(|u| u[1] == NONE) {
             let shell = self.joins.shell_of[users[0] as usize / 3];
             self.shells[shell as usize].open_sides += 1;
@@ -271,12 +280,11 @@ impl Solid {
     pub fn check(&self) -> Result<(), MeshFault> {
         self.mesh.check()?;
         let fault = |side: u32, rule| Err(MeshFault::BadSide { side: side as usize, rule });
-        let mut directions = vec![[0_u8; 2]; self.joins.ends.len()];
+        let mut directions = vec![[0_u8; 2]; self.n_sides()];
         for (corners, sides) in self.mesh.triangles.iter().zip(&self.joins.sides) {
             for (k, &side) in sides.iter().enumerate() {
                 let (a, b) = (corners[k], corners[(k + 1) % 3]);
-                if side as usize >= self.joins.ends.len() || self.ends(side) != [a.min(b), a.max(b)]
-                {
+                if side as usize >= self.n_sides() || self.ends(side) != [a.min(b), a.max(b)] {
                     return fault(side, "its ends are those of its triangles");
                 }
                 let n = &mut directions[side as usize][usize::from(a > b)];
@@ -303,33 +311,15 @@ impl Joins {
         let other = if first == half { second } else { first };
         (other != NONE).then_some(other)
     }
+}
 
-    /// Numbers the shells, and returns how many there are.
-    fn find_shells(&mut self) -> u32 {
-        let mut shell_of = vec![NONE; self.sides.len()];
-        let mut stack = Vec::new();
-        let mut n_shells = 0;
-        for start in 0..shell_of.len() as u32 {
-            if shell_of[start as usize] != NONE {
-                continue;
-            }
-            shell_of[start as usize] = n_shells;
-            stack.push(start);
-            while let Some(triangle) = stack.pop() {
-                for half in 3 * triangle..3 * triangle + 3 {
-                    if let Some(mate) = self.mate(half)
-                        && shell_of[mate as usize / 3] == NONE
-                    {
-                        shell_of[mate as usize / 3] = n_shells;
-                        stack.push(mate / 3);
-                    }
-                }
-            }
-            n_shells += 1;
-        }
-        self.shell_of = shell_of;
-        n_shells
+/// Returns the shell of each triangle, and how many there are, numbered by their first triangles.
+fn shells(n_triangles: usize, users: &[[u32; 2]]) -> (Vec<u32>, u32) {
+    let mut groups = Groups::new(n_triangles);
+    for [first, second] in users.iter().filter(|users| users[1] != NONE) {
+        groups.join(*first as usize / 3, *second as usize / 3);
     }
+    groups.numbered()
 }
 
 impl Shell {

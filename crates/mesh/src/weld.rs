@@ -135,9 +135,11 @@ pub(crate) fn exactly(soup: &Soup) -> Mesh {
     let corners = soup.facets.as_flattened();
     // Adding zero makes -0 into 0 and changes nothing else.
     let key = |i: u32| corners[i as usize].map(|c| (c + 0.0).to_bits());
-    let mut vertex_of = first_nearby(corners.len(), key);
+    let mut triangles = vec![[0; 3]; soup.facets.len()];
+    let vertex_of = triangles.as_flattened_mut();
+    first_nearby(vertex_of, key);
     let own = |(i, first): (u32, &u32)| (i == *first).then_some(i);
-    let left: Vec<u32> = (0..).zip(&vertex_of).filter_map(own).collect();
+    let left: Vec<u32> = (0..).zip(&*vertex_of).filter_map(own).collect();
     let card = |i: u32| {
         let [x, y, z] = key(left[i as usize]).map(u128::from);
         x << 96 | y << 64 | z << 32 | u128::from(i)
@@ -167,7 +169,7 @@ pub(crate) fn exactly(soup: &Soup) -> Mesh {
             false => vertex_of[first],
         };
     }
-    Mesh { vertices, triangles: vertex_of.as_chunks().0.to_vec() }
+    Mesh { vertices, triangles }
 }
 
 /// Corners among which equal ones are sought first: their table stays within the cache of a core.
@@ -177,12 +179,11 @@ const NEARBY: usize = 1 << 14;
 /// few; in a file made to collide, some equal corners are not found here.
 const MOST_TRIES: usize = 16;
 
-/// For each corner an equal one before it, if one is found nearby, or else itself. Facets that lie
-/// side by side mostly stand near each other in the file, so this leaves few corners to look at.
-fn first_nearby(n_corners: usize, key: impl Fn(u32) -> [u32; 3] + Sync) -> Vec<u32> {
+/// Writes for each corner an equal one before it, if one is found nearby, or else itself. Facets that
+/// lie side by side mostly stand near each other in the file, so this leaves few corners to look at.
+fn first_nearby(firsts: &mut [u32], key: impl Fn(u32) -> [u32; 3] + Sync) {
     const FREE: u32 = u32::MAX;
     const PLACES: usize = 2 * NEARBY;
-    let mut firsts = vec![0; n_corners];
     firsts.par_chunks_mut(NEARBY).enumerate().for_each(|(chunk, firsts)| {
         let mut table = vec![FREE; PLACES];
         for (i, first) in ((chunk * NEARBY) as u32..).zip(firsts) {
@@ -202,7 +203,6 @@ fn first_nearby(n_corners: usize, key: impl Fn(u32) -> [u32; 3] + Sync) -> Vec<u
             }
         }
     });
-    firsts
 }
 
 /// Parts this large hold corners that are not spread as those of a model are.
@@ -301,7 +301,7 @@ fn loose_vertices(mesh: &Mesh, edges: &Edges, near_mm: f64) -> Vec<Loose> {
     }
     const CLOSED: f64 = -1.0;
     let mut reach = vec![CLOSED; mesh.vertices.len()];
-    for end in edges.open().flat_map(|edge| edges.ends(edge)) {
+    for end in edges.open().flat_map(|edge| edges.ends(mesh, edge)) {
         reach[end as usize] = near_mm;
     }
     for corners in mesh.triangles.iter().filter(|t| repeated(t).is_none()) {

@@ -4,6 +4,7 @@
 //! packed around the rotation axis by the circles of their footprints: each goes as near to the
 //! middle as the larger ones before it leave room, and the middle of all of them is the axis.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use geom::bounding::Bounds;
@@ -26,14 +27,14 @@ use crate::own::Own;
 use crate::place::{Placed, Pose, Wish, place, place_together, whole_places};
 
 /// A file of a model.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Model<'a> {
     /// Its name, for messages.
     pub name: &'a Path,
     /// How it is written.
     pub format: Format,
-    /// Its bytes.
-    pub bytes: &'a [u8],
+    /// Its bytes; those that are owned are given up as soon as they are read.
+    pub bytes: Cow<'a, [u8]>,
 }
 
 /// Where several models stand.
@@ -72,7 +73,7 @@ impl Default for Arrangement {
 ///
 /// Classes with exit status 4, or `LimitExceeded`, about the file.
 pub fn read(model: &Model<'_>, wish: &Wish) -> Result<Given, Failure> {
-    let mut given = model::read(model.format, model.bytes)
+    let mut given = model::read(model.format, &model.bytes)
         .map_err(|error| unusable(error.class(), &error, error.hint()).about(model.name))?;
     if wish.scale != 1.0 {
         given.soup = given.soup.scaled(wish.scale);
@@ -456,7 +457,8 @@ mod tests {
     #[test]
     fn a_mirror_image_has_its_outside_outside() {
         let bytes = mesh::stl::write(&mesh::shapes::steps());
-        let model = Model { name: Path::new("steps.stl"), format: Format::Stl, bytes: &bytes };
+        let model =
+            Model { name: Path::new("steps.stl"), format: Format::Stl, bytes: bytes.into() };
         let image = |mirror| {
             let given = read(&model, &Wish { mirror, ..Wish::default() }).unwrap();
             repaired(&given, model.name).unwrap()

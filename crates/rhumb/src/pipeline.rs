@@ -110,8 +110,8 @@ pub fn slice(
     watch: &mut Watch<'_>,
 ) -> Result<Outcome, Failure> {
     let name = Path::new(request.name);
-    let model = Model { name, format: Format::Stl, bytes: request.model };
-    slice_all(request, &[model], &Arrangement::default(), out, watch)
+    let model = Model { name, format: Format::Stl, bytes: request.model.into() };
+    slice_all(request, vec![model], &Arrangement::default(), out, watch)
 }
 
 /// Slices models of any format, all on one bed and layer by layer together, and writes the program to
@@ -122,7 +122,7 @@ pub fn slice(
 /// [`Failure`] with what is wrong with models, settings or output.
 pub fn slice_all(
     request: &Request<'_>,
-    models: &[Model<'_>],
+    models: Vec<Model<'_>>,
     arrangement: &Arrangement,
     out: &mut (dyn Write + Send),
     watch: &mut Watch<'_>,
@@ -458,21 +458,21 @@ struct Loaded {
 /// Reads and repairs models and puts them on the bed.
 fn load(
     request: &Request<'_>,
-    models: &[Model<'_>],
+    models: Vec<Model<'_>>,
     arrangement: &Arrangement,
     clock: &mut Stopwatch,
     watch: &mut Watch<'_>,
 ) -> Result<Loaded, Failure> {
     let (job, wish) = (request.job, request.wish);
     watch.progress.stage("read", 1);
-    let given = models.iter().map(|model| models::read(model, &wish));
-    let given = given.collect::<Result<Vec<_>, _>>()?;
+    let read = |model: Model<'_>| Ok((model.name.to_owned(), models::read(&model, &wish)?));
+    let given = models.into_iter().map(read).collect::<Result<Vec<_>, Failure>>()?;
     let read_ms = clock.lap();
     watch.progress.stage("repair", 1);
     let (mut files, mut healths) = (Vec::new(), Vec::new());
-    for (model, given) in models.iter().zip(given) {
+    for (name, given) in given {
         check_size(&given.soup, job)?;
-        let mut file = models::file(&given, model.name, wish)?;
+        let mut file = models::file(&given, &name, wish)?;
         drop(given);
         if arrangement.split {
             file = file.split(&wish);

@@ -3,7 +3,6 @@
 use geom::bounding::Bounds;
 use mesh::cut::{Keep, cut};
 use mesh::health::solid_from_soup;
-use mesh::measure;
 use mesh::mesh::Mesh;
 use mesh::orient::{OrientParams, Rest, candidates, laid, rest};
 use mesh::place::{Placement, footprint, reference_azimuth};
@@ -262,20 +261,21 @@ pub enum Fit {
 ///
 /// `OutOfEnvelope`, with a guess at the units where that would explain it.
 pub fn check_size(soup: &Soup, job: &Job) -> Result<(), Failure> {
+    let most = (2.0 * job.printer.rail.max).hypot(job.printer.lift.max);
+    // A model of exactly that size is measured again where it lies.
+    let fits = |bounds: &Bounds| bounds.size().max() <= most + 1.0;
+    if fits(&soup.bounds()) {
+        return Ok(());
+    }
     let mut bounds = Bounds::default();
     let is_facet = |[a, b, c]: &&Facet| a != b && b != c && c != a;
     for corner in soup.facets.iter().filter(is_facet).flatten() {
         bounds.add(&Point3::from(corner.map(f64::from)));
     }
-    if bounds.is_empty() {
+    if fits(&bounds) {
         return Ok(());
     }
     let size = bounds.size();
-    let most = (2.0 * job.printer.rail.max).hypot(job.printer.lift.max);
-    // A model of exactly that size is measured again where it lies.
-    if size.max() <= most + 1.0 {
-        return Ok(());
-    }
     let what = format!(
         "the model measures {} x {} x {} mm; the machine holds nothing longer than {most:.1} mm",
         length(size.x),
@@ -372,12 +372,6 @@ pub fn suspect_units(placed: &Placed, job: &Job) -> Option<String> {
             too_small(&size, job)
         )
     })
-}
-
-/// Returns the volume of a mesh, mm³.
-#[must_use]
-pub fn volume(mesh: &Mesh) -> f64 {
-    measure::volume_mm3(mesh)
 }
 
 /// Returns the smallest circle around the footprint of a mesh: centre and radius, mm.

@@ -9,7 +9,6 @@ use twin::verify::Verdict;
 use crate::check::findings;
 use crate::choice::Choice;
 use crate::pipeline::{Outcome, part};
-use crate::place::volume;
 use crate::program_text::duration;
 use crate::ranges::LaidSpan;
 use crate::report::{
@@ -30,7 +29,7 @@ pub fn report(
     ranks: bool,
 ) -> Report {
     let (health, totals, part) = (&outcome.health, &outcome.totals, part(outcome));
-    let volume = volume(part);
+    let volume = outcome.placed.solid.volume_mm3();
     let bounds = part.bounds();
     let corner = |p: Point3<f64>| [p.x, p.y, p.z];
     let spans = &outcome.layout.spans;

@@ -74,7 +74,7 @@ pub fn model(bytes: &[u8]) {
     } else {
         bytes
     };
-    let model = Model { name: Path::new("x"), format, bytes };
+    let model = Model { name: Path::new("x"), format, bytes: bytes.into() };
     match models::read(&model, &Wish::default()) {
         Ok(given) => {
             assert!(given.soup.facets.iter().flatten().flatten().all(|c| c.is_finite()));

@@ -51,7 +51,7 @@ struct OnSide {
 }
 
 fn vertices_on_sides(mesh: &Mesh, edges: &Edges, near_mm: f64, tally: &mut Tally) -> Vec<OnSide> {
-    let mut loose: Vec<u32> = edges.open().flat_map(|edge| edges.ends(edge)).collect();
+    let mut loose: Vec<u32> = edges.open().flat_map(|edge| edges.ends(mesh, edge)).collect();
     loose.sort_unstable();
     loose.dedup();
     let position = |v: u32| mesh.vertices[v as usize];

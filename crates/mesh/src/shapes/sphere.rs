@@ -33,7 +33,7 @@ fn divided(mesh: &Mesh) -> Mesh {
     let n_old = mesh.vertices.len() as u32;
     let mut vertices = mesh.vertices.clone();
     vertices.extend((0..edges.len() as u32).map(|edge| {
-        let [a, b] = edges.ends(edge).map(|v| mesh.vertices[v as usize]);
+        let [a, b] = edges.ends(mesh, edge).map(|v| mesh.vertices[v as usize]);
         Point3::from(center(&a, &b).coords.normalize())
     }));
     let mut triangles = Vec::with_capacity(4 * mesh.triangles.len());

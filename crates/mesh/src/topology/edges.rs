@@ -15,8 +15,6 @@ use nalgebra::{center, distance};
 pub(crate) struct Edges {
     /// The edge of each half-edge; [`NONE`] in triangles that name a vertex twice.
     of: Vec<[u32; 3]>,
-    /// Lower and higher end.
-    ends: Vec<[u32; 2]>,
     /// The first two users; the second is [`NONE`] where there is one.
     users: Vec<[u32; 2]>,
     /// Edges with more than two users, ascending, with all of them.
@@ -43,7 +41,7 @@ impl Edges {
         let mut base = 0;
         for part in &mut found {
             part.shift(base);
-            base += part.ends.len() as u32;
+            base += part.users.len() as u32;
         }
         let answers: Vec<&[u32]> = found.iter().map(|part| part.of.as_slice()).collect();
         let of = parts.gather(&answers).as_chunks().0.to_vec();
@@ -51,7 +49,6 @@ impl Edges {
             of,
             n_open: found.iter().map(|part| part.n_open).sum(),
             n_twisted: found.iter().map(|part| part.n_twisted).sum(),
-            ends: concat(found.iter().map(|part| &part.ends)),
             users: concat(found.iter().map(|part| &part.users)),
             crowds: found.into_iter().flat_map(|part| part.crowds).collect(),
         }
@@ -69,7 +66,7 @@ impl Edges {
 
     /// How many edges there are.
     pub(crate) fn len(&self) -> usize {
-        self.ends.len()
+        self.users.len()
     }
 
     /// The edges that one triangle alone uses.
@@ -83,8 +80,8 @@ impl Edges {
     }
 
     /// The lower and the higher end of an edge.
-    pub(crate) fn ends(&self, edge: u32) -> [u32; 2] {
-        self.ends[edge as usize]
+    pub(crate) fn ends(&self, mesh: &Mesh, edge: u32) -> [u32; 2] {
+        ends_of_half(mesh, self.users[edge as usize][0])
     }
 
     /// The one or two users of an edge; `None` when there are more.
@@ -118,7 +115,7 @@ impl Edges {
     pub(crate) fn crowded(&self, mesh: &Mesh) -> Tally {
         let mut tally = Tally::default();
         for (edge, _) in &self.crowds {
-            let [a, b] = self.ends(*edge).map(|v| mesh.vertices[v as usize]);
+            let [a, b] = self.ends(mesh, *edge).map(|v| mesh.vertices[v as usize]);
             tally.add(distance(&a, &b), center(&a, &b));
         }
         tally
@@ -136,14 +133,14 @@ impl Edges {
             self.split_twisted(mesh, &crowds);
         }
         for (edge, halves) in crowds {
-            let mut pairs = crowd::pairs(mesh, self.ends(edge), &halves).into_iter();
+            let mut pairs = crowd::pairs(mesh, self.ends(mesh, edge), &halves).into_iter();
             let first = pairs.next().expect("a crowd has users");
             self.users[edge as usize] = first;
             for pair in pairs {
-                self.add_side(edge, pair);
+                self.add_side(pair);
             }
         }
-        Sides { of: self.of, ends: self.ends, users: self.users }
+        Sides { of: self.of, users: self.users }
     }
 
     fn split_twisted(&mut self, mesh: &Mesh, crowds: &[(u32, Vec<u32>)]) {
@@ -152,14 +149,13 @@ impl Edges {
             let crowded = || crowds.binary_search_by_key(&edge, |crowd| crowd.0).is_ok();
             if second != NONE && runs_up(mesh, first) == runs_up(mesh, second) && !crowded() {
                 self.users[edge as usize] = [first, NONE];
-                self.add_side(edge, [second, NONE]);
+                self.add_side([second, NONE]);
             }
         }
     }
 
-    fn add_side(&mut self, edge: u32, users: [u32; 2]) {
-        let side = self.ends.len() as u32;
-        self.ends.push(self.ends(edge));
+    fn add_side(&mut self, users: [u32; 2]) {
+        let side = self.users.len() as u32;
         self.users.push(users);
         for half in users.into_iter().filter(|half| *half != NONE) {
             self.of[half as usize / 3][half as usize % 3] = side;
@@ -171,8 +167,6 @@ impl Edges {
 pub(crate) struct Sides {
     /// The side of each half-edge.
     pub(crate) of: Vec<[u32; 3]>,
-    /// Lower and higher end.
-    pub(crate) ends: Vec<[u32; 2]>,
     /// The users; the second is [`NONE`] where the side is open.
     pub(crate) users: Vec<[u32; 2]>,
 }
@@ -182,6 +176,11 @@ pub(crate) fn runs_up(mesh: &Mesh, half: u32) -> bool {
     let corners = &mesh.triangles[half as usize / 3];
     let k = half as usize % 3;
     corners[k] < corners[(k + 1) % 3]
+}
+
+/// The lower and the higher end of a half-edge.
+pub(crate) fn ends_of_half(mesh: &Mesh, half: u32) -> [u32; 2] {
+    ends_of(&mesh.triangles[half as usize / 3], half as usize % 3)
 }
 
 fn ends_of(corners: &[u32; 3], k: usize) -> [u32; 2] {
@@ -201,7 +200,6 @@ fn concat<'a, T: Copy + 'a>(parts: impl Iterator<Item = &'a Vec<T>> + Clone) -> 
 #[derive(Default)]
 struct Found {
     of: Vec<u32>,
-    ends: Vec<[u32; 2]>,
     users: Vec<[u32; 2]>,
     crowds: Vec<(u32, Vec<u32>)>,
     n_open: usize,
@@ -233,16 +231,15 @@ fn find(triangles: &[[u32; 3]], halves: &[u32]) -> Found {
     let keys = sorted(keys);
     let mut found = Found { of: vec![NONE; halves.len()], ..Found::default() };
     for run in keys.chunk_by(|a, b| a >> 32 == b >> 32) {
-        let edge = found.ends.len() as u32;
+        let edge = found.users.len() as u32;
         let half = |key: &u128| halves[*key as u32 as usize];
         for key in run {
             found.of[*key as u32 as usize] = edge;
         }
         let first = half(&run[0]);
         let second = run.get(1).map_or(NONE, half);
-        let ends = ends_of(corners(first), first as usize % 3);
-        let runs_up = |half: u32| corners(half)[half as usize % 3] == ends[0];
-        found.ends.push(ends);
+        let low = (run[0] >> 64) as u32;
+        let runs_up = |half: u32| corners(half)[half as usize % 3] == low;
         found.users.push([first, second]);
         match run.len() {
             1 => found.n_open += 1,
@@ -279,9 +276,10 @@ mod tests {
     fn users_are_counted() {
         let triangles =
             vec![[0, 1, 2], [1, 0, 3], [0, 1, 4], [5, 6, 6], [7, 8, 2], [8, 7, 3], [4, 2, 8]];
-        let edges = Edges::of(&flat(triangles));
+        let mesh = flat(triangles);
+        let edges = Edges::of(&mesh);
         assert_eq!(edges.crowds(), [(0, vec![0, 3, 6])]);
-        assert_eq!(edges.ends(0), [0, 1]);
+        assert_eq!(edges.ends(&mesh, 0), [0, 1]);
         assert_eq!(edges.of_triangles()[3], [NONE; 3]);
         assert_eq!(edges.users(0), None);
         let shared = edges.of_triangles()[4][0];
@@ -297,7 +295,7 @@ mod tests {
         let edges = Edges::of(&mesh);
         assert_eq!((edges.n_twisted(), edges.len()), (1, 5));
         let sides = edges.into_sides(&mesh);
-        assert_eq!((sides.ends.len(), sides.users.len()), (6, 6));
+        assert_eq!(sides.users.len(), 6);
         assert_ne!(sides.of[0][0], sides.of[1][0]);
         assert!(sides.users.iter().all(|u| u[1] == NONE));
     }
@@ -306,8 +304,9 @@ mod tests {
     fn edges_are_numbered_by_their_ends() {
         let triangles = (0..60_000_u32).map(|i| [i, i + 1, i + 2]).collect();
         let vertices = vec![Point3::origin(); 60_002];
-        let edges = Edges::of(&Mesh { vertices, triangles });
-        assert!(edges.ends.is_sorted());
+        let mesh = Mesh { vertices, triangles };
+        let edges = Edges::of(&mesh);
+        assert!((0..edges.len() as u32).is_sorted_by_key(|edge| edges.ends(&mesh, edge)));
         assert_eq!(edges.len(), 120_001);
     }
 }

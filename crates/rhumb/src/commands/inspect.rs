@@ -11,7 +11,7 @@ use super::{DONE, LOOK, display_name, say, say_json};
 use crate::args::{Inspect, Manner};
 use crate::failure::Failure;
 use crate::input;
-use crate::place::{Wish, volume};
+use crate::place::Wish;
 
 /// Crossings that are listed; a mesh with more is not mended by knowing all.
 const MOST_CROSSINGS: usize = 1000;
@@ -35,7 +35,7 @@ fn as_json(name: &str, solid: &Solid, health: &Health, crossings: usize) -> serd
         "facets": health.facets,
         "triangles": health.triangles,
         "shells": health.shells,
-        "volume_mm3": volume(solid.mesh()),
+        "volume_mm3": solid.volume_mm3(),
         "area_mm2": health.area_mm2,
         "bounds_mm": [
             [bounds.min.x, bounds.min.y, bounds.min.z],
@@ -77,7 +77,7 @@ fn as_text(solid: &Solid, health: &Health, crossings: usize) -> String {
             decimal(bounds.min.z, 3)
         ),
     );
-    row("volume", format!("{} mm³", decimal(volume(solid.mesh()), 2)));
+    row("volume", format!("{} mm³", decimal(solid.volume_mm3(), 2)));
     row("surface", format!("{} mm²", decimal(health.area_mm2, 2)));
     row("facets", format!("{} in the file, {} after repair", health.facets, health.triangles));
     row("shells", health.shells.to_string());

@@ -103,7 +103,7 @@ fn settings(arguments: &SettingsArguments) -> Result<(Settings, Job), Failure> {
 
 /// Reads the mesh of a file; of the wish, scale and mirrors count.
 fn solid(path: &Path, bytes: &[u8], wish: &Wish) -> Result<(Solid, Health), Failure> {
-    let model = Model { name: path, format: Format::of(path, bytes), bytes };
+    let model = Model { name: path, format: Format::of(path, bytes), bytes: bytes.into() };
     models::repaired(&models::read(&model, wish)?, path)
 }
 

@@ -44,7 +44,7 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     arrangement.own = own::asked(&arguments.object, &settings)?;
     let target = target(arguments);
     let inputs: Vec<&Path> = arguments.models.iter().map(PathBuf::as_path).collect();
-    let bytes = inputs.iter().map(|path| input::read(path)).collect::<Result<Vec<_>, _>>()?;
+    let models = models(&inputs)?;
     let mut out = Output::create(&target, &inputs)?;
     let beside = |path: &Option<PathBuf>| path.as_deref().map(|p| Output::create(p, &inputs));
     let report_file = beside(&arguments.report).transpose()?;
@@ -52,11 +52,8 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     let preview_file = beside(&arguments.preview_gcode).transpose()?;
 
     let mut progress = progress(manner);
-    let models: Vec<Model> = inputs
-        .iter()
-        .zip(&bytes)
-        .map(|(name, bytes)| Model { name, format: Format::of(name, bytes), bytes })
-        .collect();
+    // A preview is a slice of its own, for which the bytes must stay.
+    let again = preview_file.is_some().then(|| models.clone());
     let name = names(&inputs);
     let (mut outcome, preview_file) = {
         let mut text = BufWriter::with_capacity(1 << 16, out.file());
@@ -69,7 +66,7 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
             made_at: &clock::now(),
         };
         let watch = &mut Watch { progress: &mut *progress, interrupt: &interrupt };
-        let mut outcome = pipeline::slice_all(&request, &models, &arrangement, &mut text, watch)
+        let mut outcome = pipeline::slice_all(&request, models, &arrangement, &mut text, watch)
             .map_err(|failure| about_model(failure, &inputs))?;
         outcome.warnings.extend(calibration::warning(&job.printer));
         text.flush().map_err(|error| output::failed(&target, &error))?;
@@ -77,11 +74,13 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
         if job.tells_progress {
             out = with_progress(&out, &target, &inputs, outcome.totals.time, &job.dialect)?;
         }
-        let seen = Seen { request: &request, models: &models, arrangement: &arrangement };
-        let shown = preview_file.map(|file| preview(&seen, &wanted, file, watch)).transpose()?;
+        let shown = preview_file.zip(again).map(|(file, models)| {
+            let seen = Seen { request: &request, models, arrangement: &arrangement };
+            preview(seen, &wanted, file, watch)
+        });
+        let shown = shown.transpose()?;
         (outcome, shown)
     };
-    drop(bytes);
     let verdict = if arguments.effort.no_verify {
         None
     } else {
@@ -110,6 +109,15 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     let misses_flats = job.schedule.snap != Snap::Off && outcome.layout.missed().next().is_some();
     let needs_a_look = !report.verify.findings.is_empty() || outcome.health.guessed || misses_flats;
     Ok(if needs_a_look { LOOK } else { DONE })
+}
+
+/// The files of the models, as they are.
+fn models<'a>(inputs: &[&'a Path]) -> Result<Vec<Model<'a>>, Failure> {
+    let model = |&name: &&'a Path| {
+        let bytes = input::read(name)?;
+        Ok(Model { name, format: Format::of(name, &bytes), bytes: bytes.into() })
+    };
+    inputs.iter().map(model).collect()
 }
 
 /// The program with what is done and left put behind every line that says how long it has taken so far.
@@ -152,13 +160,13 @@ fn elapsed(line: &[u8]) -> Option<f64> {
 /// What was sliced.
 struct Seen<'a> {
     request: &'a Request<'a>,
-    models: &'a [Model<'a>],
+    models: Vec<Model<'a>>,
     arrangement: &'a Arrangement,
 }
 
 /// The same in part coordinates.
 fn preview(
-    seen: &Seen<'_>,
+    seen: Seen<'_>,
     wanted: &SettingsArguments,
     mut file: Output,
     watch: &mut Watch<'_>,
