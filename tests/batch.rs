@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
-use crate::run::{Ran, Scratch};
+use crate::run::{Ran, Scratch, wait_until};
 
 /// A folder with three sound models, a broken one and one that is too large.
 fn with_models() -> Scratch {
@@ -139,16 +139,12 @@ fn a_batch_that_was_killed_goes_on_where_it_stopped() {
     scratch.cube("models/b.stl", 100.0);
     let fine = ["batch", "models", "--out-dir", "out", "--set", "layer_height_mm=0.05"];
     let mut child = scratch.rhumb(&fine).spawn().unwrap();
-    let start = std::time::Instant::now();
-    while !scratch.path("out/a.gcode").exists() {
-        assert!(start.elapsed().as_secs() < 60, "the first model is never done");
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    std::thread::sleep(std::time::Duration::from_millis(200));
+    let journal = scratch.path("out/batch.jsonl");
+    let is_noted = || std::fs::read_to_string(&journal).is_ok_and(|j| j.contains("a.stl"));
+    wait_until("the first model is done", is_noted);
     child.kill().unwrap();
     child.wait().unwrap();
     // A line that was cut off.
-    let journal = scratch.path("out/batch.jsonl");
     let mut lines = std::fs::read(&journal).unwrap();
     lines.extend_from_slice(b"{\"model\":\"models/b.s");
     std::fs::write(&journal, lines).unwrap();

@@ -5,10 +5,9 @@
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::run::{Ran, Scratch};
+use crate::run::{Ran, Scratch, wait_until};
 
-/// Longest time until a run has begun, and until one that is asked to stop has ended. Far more than
-/// either takes, for slow machines.
+/// Longest time until a run that is asked to stop has ended. Far more than it takes, for slow machines.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// A run that would take minutes, in a folder with an old program; it has begun to write.
@@ -20,16 +19,12 @@ fn long_run(scratch: &Scratch) -> Child {
     arguments.extend(fine.iter().flat_map(|pair| ["--set", pair]));
     let child =
         scratch.rhumb(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let start = Instant::now();
     let is_writing = |name: &String| {
         name.ends_with(".tmp")
             && name.contains("cube.gcode")
             && scratch.path(name).metadata().is_ok_and(|file| file.len() > 0)
     };
-    while !scratch.names().iter().any(is_writing) {
-        assert!(start.elapsed() < PATIENCE, "the run does not begin");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    wait_until("the run writes", || scratch.names().iter().any(is_writing));
     child
 }
 
@@ -64,13 +59,9 @@ fn a_batch_that_is_asked_to_stop_keeps_what_is_finished() {
     let fine = ["batch", "a.stl", "b.stl", "--out-dir", "out", "--set", "layer_height_mm=0.05"];
     let mut batch = scratch.rhumb(&fine);
     let child = batch.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let start = Instant::now();
     // The journal is written after the program, and before the line that tells of it.
-    let is_noted = || std::fs::metadata(scratch.path("out/batch.jsonl")).is_ok_and(|j| j.len() > 0);
-    while !is_noted() {
-        assert!(start.elapsed() < PATIENCE, "the first model is never done");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    let journal = scratch.path("out/batch.jsonl");
+    wait_until("the first model is done", || journal.metadata().is_ok_and(|file| file.len() > 0));
     let sent = Command::new("kill").args(["-s", "TERM", &child.id().to_string()]).status().unwrap();
     assert!(sent.success());
     let ran = Ran::from(child.wait_with_output().unwrap());

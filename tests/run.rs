@@ -4,6 +4,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
 
 /// The root of the repository.
 pub(crate) fn root() -> &'static Path {
@@ -122,6 +123,16 @@ impl Ran {
         assert!(self.err.len() <= 4096, "{} bytes are too many to read", self.err.len());
         assert!(self.out.is_empty(), "{}", self.out);
         self
+    }
+}
+
+/// Waits until something is so; far longer than it takes on a slow machine.
+#[track_caller]
+pub(crate) fn wait_until(what: &str, is_so: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !is_so() {
+        assert!(start.elapsed() < Duration::from_secs(60), "never so: {what}");
+        std::thread::sleep(Duration::from_millis(5));
     }
 }
 
