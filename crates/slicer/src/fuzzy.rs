@@ -77,8 +77,34 @@ pub fn roughened(
             rough.push((*to, *to_bead));
         }
     }
+    leave_out_spikes(&mut rough, params.depth);
     // A line too short for it stays as it is.
     if rough.len() < 3 { line.to_vec() } else { rough }
+}
+
+/// A closed line that turns by more than this runs back over itself, radians: 175°.
+const SPIKE: f64 = 175.0 * std::f64::consts::PI / 180.0;
+
+/// Leaves out points from which a closed line runs back over the way it came: where a side is short, or at a
+/// corner, the next point may lie behind the one before. No such spike is longer than `depth` by much.
+fn leave_out_spikes(line: &mut Vec<(Point2<f64>, Bead)>, depth: f64) {
+    let mut k = 0;
+    // How many points in a row are known to be none; without one, its neighbours may be some.
+    let mut sound = 0;
+    while line.len() > 3 && sound < line.len() {
+        let n = line.len();
+        k %= n;
+        let (into, out) = (line[k].0 - line[(k + n - 1) % n].0, line[(k + 1) % n].0 - line[k].0);
+        let is_short = into.norm().min(out.norm()) <= 2.0 * depth;
+        if is_short && into.angle(&out) > SPIKE {
+            line.remove(k);
+            sound = 0;
+            k = (k + n - 2) % (n - 1);
+        } else {
+            k += 1;
+            sound += 1;
+        }
+    }
 }
 
 /// Numbers from 0 to 1 that look random (splitmix64).
@@ -132,6 +158,34 @@ mod tests {
         assert!((0.1..0.2).contains(&mean), "{mean}");
         assert_eq!(roughened(&line, 7, &params, |_| true), rough);
         assert_ne!(roughened(&line, 8, &params, |_| true), rough);
+    }
+
+    #[test]
+    fn no_line_runs_back_over_the_one_before() {
+        // A plate with a narrow slot that ends in a tight arc, and with tight arcs beside its mouth.
+        let bead = Bead { width: 0.45, thickness: 0.2 };
+        let arc = |x: f64, y: f64, radius: f64, from: f64, turn: f64| {
+            (0..=24).map(move |k| {
+                let angle = (from + turn * f64::from(k) / 24.0).to_radians();
+                Point2::new(x + radius * angle.cos(), y + radius * angle.sin())
+            })
+        };
+        let mut line: Vec<Point2<f64>> =
+            [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0]].map(Point2::from).to_vec();
+        line.extend(arc(10.4, 19.9, 0.1, 90.0, 90.0));
+        line.extend(arc(10.0, 8.0, 0.3, 0.0, -180.0));
+        line.extend(arc(9.6, 19.9, 0.1, 0.0, 90.0));
+        line.push(Point2::new(0.0, 20.0));
+        let line: Vec<(Point2<f64>, Bead)> = line.into_iter().map(|p| (p, bead)).collect();
+        for layer in 1..300 {
+            let rough = roughened(&line, layer, &FuzzyParams { depth: 0.3, step: 0.8 }, |_| true);
+            let n = rough.len();
+            for k in 0..n {
+                let [a, b, c] = [k, k + 1, k + 2].map(|k| rough[k % n].0);
+                let turn = (b - a).angle(&(c - b)).to_degrees();
+                assert!(turn < 175.0, "layer {layer}: {turn}° at {b}");
+            }
+        }
     }
 
     #[test]

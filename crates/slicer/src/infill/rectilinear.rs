@@ -37,14 +37,13 @@ pub(super) fn evenly(area: &Region, wanted: f64, angle: f64) -> Even {
     let within = across(&area.inset(wanted / 2.0), angle);
     let shrinking = (whole - within) / wanted;
     let gaps = (within / wanted).round();
-    let spacing = if gaps < 1.0 {
-        whole.clamp(wanted * NARROWEST, wanted * WIDEST)
-    } else {
-        whole / (gaps + shrinking)
-    };
+    let spacing = if gaps < 1.0 { whole } else { whole / (gaps + shrinking) };
+    let spacing = spacing.clamp(wanted * NARROWEST, wanted * WIDEST);
     let core = area.inset(spacing / 2.0);
     let (low, high) = extent(&core, angle);
     let (low, high) = (low + OFF_RIM_MM, high - OFF_RIM_MM);
+    // A narrow tongue may be left inside by one distance and not by another a little different.
+    let gaps = if gaps < 1.0 { 0.0 } else { ((high - low) / spacing).round() };
     let rows = if gaps < 1.0 {
         Rows { first: f64::midpoint(low, high), spacing, count: Some(1) }
     } else {
@@ -55,7 +54,7 @@ pub(super) fn evenly(area: &Region, wanted: f64, angle: f64) -> Even {
     Even { core, chords, rows, spacing }
 }
 
-/// The narrowest and the widest that a line alone in its area may be, as shares of its spacing.
+/// The narrowest and the widest that lines may be for their area, as shares of their spacing.
 const NARROWEST: f64 = 0.7;
 const WIDEST: f64 = 1.5;
 
@@ -134,4 +133,34 @@ fn chords(core: &Region, rows: &Rows, angle: f64) -> (Vec<Chord>, Vec<(i64, [f64
             (chord, (pair[0].row, [pair[0].along, pair[1].along]))
         })
         .unzip()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geom::region::Fill;
+
+    #[test]
+    fn lines_stay_about_as_far_apart_as_wanted() {
+        let wanted = 0.43;
+        for k in 0..200 {
+            // A low block with a tongue that is about as narrow as a line.
+            let tongue = 0.3 + 0.002 * f64::from(k);
+            for height in [0.5, 1.0, 1.7] {
+                let ring = [
+                    [0.0, 0.0],
+                    [10.0, 0.0],
+                    [10.0, height],
+                    [3.0 + tongue, height],
+                    [3.0 + tongue * 0.9, height + 4.0],
+                    [3.0, height + 4.0],
+                    [3.0, height],
+                    [0.0, height],
+                ];
+                let area = Region::from_rings([ring.map(Point2::from).as_slice()], Fill::NonZero);
+                let spacing = evenly(&area, wanted, 0.0).spacing / wanted;
+                assert!((0.5..1.6).contains(&spacing), "{tongue} {height}: {spacing}");
+            }
+        }
+    }
 }

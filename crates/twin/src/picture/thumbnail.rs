@@ -88,23 +88,35 @@ impl Thumbnail {
 
     /// The entries of the palette that the samples of each pixel come to.
     fn gathered(&self, side: usize) -> Vec<u8> {
-        let bound = |k: usize| k * SAMPLES / side;
-        let pixel = |x: usize, y: usize| {
-            let (mut lights, mut covered) = (0, 0);
-            for row in bound(y)..bound(y + 1) {
-                let samples = &self.raster.paint[row * SAMPLES..][bound(x)..bound(x + 1)];
-                for paint in samples.iter().filter(|paint| **paint != Raster::BARE) {
-                    lights += paint;
-                    covered += 1;
+        let bounds: Vec<usize> = (0..=side).map(|k| k * SAMPLES / side).collect();
+        let mut pixels = Vec::with_capacity(side * side);
+        for rows in bounds.windows(2) {
+            for columns in bounds.windows(2) {
+                let (mut lights, mut covered) = (0, 0);
+                for row in rows[0]..rows[1] {
+                    let samples = &self.raster.paint[row * SAMPLES..][columns[0]..columns[1]];
+                    for paint in samples.iter().filter(|paint| **paint != Raster::BARE) {
+                        lights += paint;
+                        covered += 1;
+                    }
                 }
+                let all = (columns[1] - columns[0]) * (rows[1] - rows[0]);
+                pixels.push(pixel(lights, covered, all as u32));
             }
-            let all = ((bound(x + 1) - bound(x)) * (bound(y + 1) - bound(y))) as u32;
-            // Rounded: a pixel that is hardly covered is bare.
-            let cover = (covered * COVERS + all / 2) / all;
-            if cover == 0 { 0 } else { entry((lights + covered / 2) / covered, cover) }
-        };
-        (0..side * side).map(|k| pixel(k % side, k / side)).collect()
+        }
+        pixels
     }
+}
+
+/// The entry of the palette for a pixel of which so many of `all` samples are covered, with so much light
+/// together.
+fn pixel(lights: u32, covered: u32, all: u32) -> u8 {
+    if covered == 0 {
+        return 0;
+    }
+    // Rounded: a pixel that is hardly covered is bare.
+    let cover = (covered * COVERS + all / 2) / all;
+    if cover == 0 { 0 } else { entry((lights + covered / 2) / covered, cover) }
 }
 
 /// How the part is laid into the square.
