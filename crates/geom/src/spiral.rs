@@ -77,6 +77,14 @@ impl Spiral {
         rho / self.growth()
     }
 
+    /// Returns the parameter at which the spiral passes nearest to a place on the ray through it: less
+    /// than half a pitch away, except inside the first turn.
+    #[must_use]
+    pub fn nearest_turn(&self, p: &Point2<f64>) -> f64 {
+        let (turns, rho) = (self.value(p), p.coords.norm());
+        self.tau_at(rho) - TAU * (turns - turns.round())
+    }
+
     /// Returns points along the spiral from `tau0` to `tau1` (either may be larger), both ends
     /// included, so that no chord lies farther than `tolerance` (mm) from the curve.
     #[must_use]
@@ -258,6 +266,19 @@ mod tests {
             let (p, q) = (spiral.at(tau), spiral.at(tau + TAU));
             assert!((q.coords.norm() - p.coords.norm() - 0.4).abs() < 1e-12);
             assert!(p.coords.perp(&q.coords).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_nearest_turn_lies_on_the_ray() {
+        for turning in BOTH {
+            let spiral = Spiral { pitch: 0.4, phase: 0.7, turning };
+            for (k, off) in [-0.19, -0.1, 0.0, 0.15].into_iter().enumerate() {
+                let tau = 20.0 + 9.1 * k as f64;
+                let at = spiral.at(tau);
+                let beside = at + at.coords.normalize() * off;
+                assert!((spiral.nearest_turn(&beside) - tau).abs() < 1e-9);
+            }
         }
     }
 

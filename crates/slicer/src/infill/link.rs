@@ -71,6 +71,16 @@ pub(super) fn joined(
     chords: &[Chord],
     params: &JoinParams,
 ) -> Vec<Vec<Point2<f64>>> {
+    joined_pieces(core, chords, params).iter().map(|line| line.concat()).collect()
+}
+
+/// Returns the same lines in pieces: of the rim, a chord, of the rim, another chord and so on, with the rim
+/// of a free end at either end. Pieces of rim lack the ends of the chords beside them, and may be empty.
+pub(super) fn joined_pieces(
+    core: &Region,
+    chords: &[Chord],
+    params: &JoinParams,
+) -> Vec<Vec<Vec<Point2<f64>>>> {
     let rings: Vec<Vec<Point2<f64>>> =
         core.rings().map(|ring| ring.iter().map(|&p| mm(p)).collect()).collect();
     let mut joins = possible_joins(&rings, chords);
@@ -253,35 +263,38 @@ fn possible_joins(rings: &[Vec<Point2<f64>>], chords: &[Chord]) -> Vec<Join> {
     joins
 }
 
-/// Walks through chords and joins from every free end.
+/// Walks through chords and joins from every free end, and returns them in pieces.
 fn chains(
     rings: &[Vec<Point2<f64>>],
     chords: &[Chord],
     made: &[[Option<Join>; 2]],
     stub: impl Fn(End) -> Vec<Point2<f64>>,
-) -> Vec<Vec<Point2<f64>>> {
+) -> Vec<Vec<Vec<Point2<f64>>>> {
     let mut used = vec![false; chords.len()];
     let mut lines = Vec::new();
     for start in 0..chords.len() {
         let free = (0..2).find(|&k| made[start][k].is_none());
         let Some(mut entry) = free.filter(|_| !used[start]) else { continue };
         let mut at = start;
-        let mut line: Vec<Point2<f64>> = stub((start, entry));
-        line.reverse();
+        let mut first = stub((start, entry));
+        first.reverse();
+        let mut line = vec![first];
         loop {
             used[at] = true;
-            if entry == 0 {
-                line.extend(&chords[at].points);
-            } else {
-                line.extend(chords[at].points.iter().rev());
+            let mut along = chords[at].points.clone();
+            if entry == 1 {
+                along.reverse();
             }
+            line.push(along);
             let exit = 1 - entry;
             let Some(join) = made[at][exit] else {
-                line.extend(stub((at, exit)));
+                line.push(stub((at, exit)));
                 break;
             };
             let forwards = join.from == (at, exit);
-            append_rim(rings, chords, &join, forwards, &mut line);
+            let mut corners = Vec::new();
+            append_rim(rings, chords, &join, forwards, &mut corners);
+            line.push(corners);
             (at, entry) = join.other((at, exit));
         }
         lines.push(line);

@@ -17,6 +17,7 @@ pub mod lightning;
 mod link;
 mod monotonic;
 mod rectilinear;
+mod rim;
 mod solid;
 pub(crate) mod sparse;
 mod spiral;
@@ -513,6 +514,66 @@ mod tests {
                 assert!(groove < 0.3, "{middle} {index}: {groove}");
                 let ratio = laid(&filling) / ring.area();
                 assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
+            }
+        }
+    }
+
+    /// The longest stretch along which a line lies nearer than this to another, or to itself farther
+    /// along, mm.
+    fn laid_twice(filling: &Filling, apart: f64) -> f64 {
+        let step = 0.1;
+        let mut places: Vec<(Point2<f64>, usize, f64)> = Vec::new();
+        for (line, points) in filling.lines.iter().map(|line| &line.points).enumerate() {
+            let mut along = 0.0;
+            for side in points.windows(2) {
+                let length = (side[1] - side[0]).norm();
+                let count = (length / step).ceil();
+                let shares = (0..count as u32).map(|i| f64::from(i) / count);
+                places.extend(shares.map(|share| {
+                    (side[0] + (side[1] - side[0]) * share, line, along + share * length)
+                }));
+                along += length;
+            }
+        }
+        let mut by_x = places.clone();
+        by_x.sort_by(|a, b| a.0.x.total_cmp(&b.0.x));
+        let (mut longest, mut run): (f64, f64) = (0.0, 0.0);
+        for (at, line, along) in &places {
+            let first = by_x.partition_point(|(p, ..)| p.x < at.x - apart);
+            let near = by_x[first..].iter().take_while(|(p, ..)| p.x < at.x + apart);
+            let is_twice = near.into_iter().any(|(p, other, beyond)| {
+                let is_other = other != line || (along - beyond).abs() > 2.0;
+                is_other && (p - at).norm() < apart
+            });
+            run = if is_twice { run + step } else { 0.0 };
+            longest = longest.max(run);
+        }
+        longest
+    }
+
+    /// Where a rim runs round the axis no line is laid over the turn beside it.
+    #[test]
+    fn rims_that_run_along_turns_are_not_laid_on_them() {
+        let cone = Cone::new(0.3).unwrap();
+        let layer = FillLayer { surface: &cone, chart: cone.chart(9.0), level: 9.0, ..LAYER };
+        let plate = rectangle(-16.0, -16.0, 32.0, 32.0);
+        for k in 0..12_u32 {
+            // As a bar across a cone is cut: straight inside, round outside.
+            let radius = 11.7 + 0.04 * f64::from(k);
+            let at = |i: i32| f64::from(i) * 0.03;
+            let arc: Vec<[f64; 2]> =
+                (-18..=18).map(|i| [radius * at(i).cos(), radius * at(i).sin()]).collect();
+            for turned in 0..4 {
+                let (sin, cos) = (TAU / 4.0 * f64::from(turned)).sin_cos();
+                let hole: Vec<[f64; 2]> =
+                    arc.iter().map(|[x, y]| [x * cos - y * sin, x * sin + y * cos]).collect();
+                let area = plate.difference(&polygon(&hole));
+                let skins = Skins { solid: area.clone(), ..Skins::default() };
+                let filling = fill(&skins, &layer, &PARAMS);
+                let twice = laid_twice(&filling, 0.3 * PARAMS.solid_width);
+                assert!(twice < 5.0, "{radius} {turned}: {twice} mm are laid twice");
+                let ratio = laid(&filling) / area.area();
+                assert!((ratio - 1.0).abs() < 0.03, "{radius} {turned}: {ratio}");
             }
         }
     }

@@ -6,11 +6,13 @@
 //! layer's chart, mm.
 
 use geom::region::{Island, Region};
+use geom::spiral::Spiral;
 
-use super::link::JoinParams;
+use super::link::{self, JoinParams};
+use super::spiral::Turns;
 use super::{
     FillLayer, FillLine, Filling, SOLID_JOINS, SolidPattern, closed_lines, concentric, fill_lines,
-    monotonic, open_lines, rectilinear, spiral, turning,
+    monotonic, open_lines, rectilinear, rim, turning,
 };
 use crate::bead::Bead;
 use crate::toolpath::Role;
@@ -135,9 +137,12 @@ impl Solid {
         let core = layer.chart.inset(area, bead.spacing() / 2.0);
         // Turns of neighbouring layers lie in each other's grooves.
         let phase = if layer.index.is_multiple_of(2) { 0.0 } else { std::f64::consts::PI };
-        let turning = turning(layer.index);
-        let chords = spiral::chords(&core, bead.spacing(), phase, turning, layer.tolerance);
-        let lines = open_lines(&core, &chords, &SOLID_JOINS, self.role, bead, layer);
+        let spiral = Spiral { pitch: bead.spacing(), phase, turning: turning(layer.index) };
+        let turns = Turns::inside(&core, spiral);
+        let chords = turns.chords(layer.tolerance);
+        let lines = link::joined_pieces(&core, &chords, &SOLID_JOINS);
+        let lines = lines.iter().flat_map(|pieces| rim::without_turns(pieces, &turns)).collect();
+        let lines: Vec<FillLine> = fill_lines(lines, self.role, bead, layer).collect();
         let bead = balanced(&lines, area, layer)?;
         Some(lines.into_iter().map(|line| FillLine { bead, ..line }).collect())
     }

@@ -7,14 +7,15 @@
 
 use geom::polyline::distance_to_segment;
 use geom::region::Region;
-use geom::spiral::Turning;
+use geom::spiral::{Spiral, Turning};
 use nalgebra::{Point2, Rotation2, Vector3};
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_3};
 
 use super::clip::{Clipped, clipped};
 use super::link::JoinParams;
+use super::spiral::Turns;
 use super::{Chord, FillLayer, FillLine, InfillParams, Pattern};
-use super::{closed_lines, concentric, field, honeycomb, open_lines, rectilinear, spiral};
+use super::{closed_lines, concentric, field, honeycomb, open_lines, rectilinear};
 use crate::bead::Bead;
 use crate::chart::Chart;
 use crate::toolpath::Role;
@@ -60,7 +61,8 @@ pub(crate) fn fill(area: &Region, layer: &FillLayer<'_>, params: &InfillParams) 
             // Sparse lines must stand on those of the layer below: neither phase nor sense changes.
             let core = layer.chart.inset(area, from_edge);
             let turning = Turning::CounterClockwise;
-            let chords = spiral::chords(&core, spacing, 0.0, turning, layer.tolerance);
+            let spiral = Spiral { pitch: spacing, phase: 0.0, turning };
+            let chords = Turns::inside(&core, spiral).chords(layer.tolerance);
             let joins = joins(params);
             return open_lines(&core, &chords, &joins, Role::InternalInfill, bead, layer);
         }

@@ -2,58 +2,70 @@
 
 use geom::grid::mm;
 use geom::region::Region;
-use geom::spiral::{Spiral, Turning};
+use geom::spiral::Spiral;
 use nalgebra::Point2;
 
 use super::{Chord, RimPoint};
 
-/// Returns the pieces of the spiral inside `core`, in order outwards.
-///
-/// Every place where the spiral meets a ring is found exactly and sorted along the spiral: from
-/// each odd one to the next it runs inside. An odd number of places means that it begins inside.
-pub(super) fn chords(
-    core: &Region,
-    pitch: f64,
-    phase: f64,
-    turning: Turning,
-    tolerance: f64,
-) -> Vec<Chord> {
-    let spiral = Spiral { pitch, phase, turning };
-    pieces(core, &spiral)
-        .into_iter()
-        .map(|[from, to]| Chord {
-            points: spiral.flatten(from.0, to.0, tolerance),
-            ends: [from.1, to.1],
-        })
-        .collect()
+/// The pieces of a spiral inside an area, in order outwards.
+pub(super) struct Turns {
+    spiral: Spiral,
+    /// The parameter and the place on the rim of both ends of each.
+    pieces: Vec<[(f64, Option<RimPoint>); 2]>,
 }
 
-/// The parameter and the place on the rim of both ends of each piece.
-fn pieces(core: &Region, spiral: &Spiral) -> Vec<[(f64, Option<RimPoint>); 2]> {
-    let mut meetings: Vec<(f64, Option<RimPoint>)> = Vec::new();
-    for (ring, points) in core.rings().enumerate() {
-        let points: Vec<Point2<f64>> = points.iter().map(|&p| mm(p)).collect();
-        for side in 0..points.len() {
-            let (a, b) = (&points[side], &points[(side + 1) % points.len()]);
-            meetings.extend(
-                spiral
-                    .crossings(a, b)
-                    .into_iter()
-                    .map(|c| (c.tau, Some(RimPoint { ring, side, share: c.share }))),
-            );
+impl Turns {
+    /// Every place where the spiral meets a ring is found exactly and sorted along the spiral: from
+    /// each odd one to the next it runs inside. An odd number of places means that it begins inside.
+    pub(super) fn inside(core: &Region, spiral: Spiral) -> Self {
+        let mut meetings: Vec<(f64, Option<RimPoint>)> = Vec::new();
+        for (ring, points) in core.rings().enumerate() {
+            let points: Vec<Point2<f64>> = points.iter().map(|&p| mm(p)).collect();
+            for side in 0..points.len() {
+                let (a, b) = (&points[side], &points[(side + 1) % points.len()]);
+                meetings.extend(
+                    spiral
+                        .crossings(a, b)
+                        .into_iter()
+                        .map(|c| (c.tau, Some(RimPoint { ring, side, share: c.share }))),
+                );
+            }
         }
+        if meetings.len() % 2 == 1 {
+            meetings.push((0.0, None));
+        }
+        meetings.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let pieces = meetings.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+        Self { spiral, pieces }
     }
-    if meetings.len() % 2 == 1 {
-        meetings.push((0.0, None));
+
+    /// Each piece as a chord that lies no farther than `tolerance` from it, mm.
+    pub(super) fn chords(&self, tolerance: f64) -> Vec<Chord> {
+        let chord = |[from, to]: &[(f64, Option<RimPoint>); 2]| Chord {
+            points: self.spiral.flatten(from.0, to.0, tolerance),
+            ends: [from.1, to.1],
+        };
+        self.pieces.iter().map(chord).collect()
     }
-    meetings.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    meetings.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
+
+    /// The distance of the turns, mm.
+    pub(super) fn pitch(&self) -> f64 {
+        self.spiral.pitch
+    }
+
+    /// Returns whether a piece passes less than half a pitch from a place, along the ray through it.
+    pub(super) fn pass(&self, p: &Point2<f64>) -> bool {
+        let tau = self.spiral.nearest_turn(p);
+        let next = self.pieces.partition_point(|[from, _]| from.0 <= tau);
+        next.checked_sub(1).is_some_and(|k| tau <= self.pieces[k][1].0)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use geom::region::Fill;
+    use geom::spiral::Turning;
     use serde_json::Value;
 
     /// The vectors, from a `shared/vectors` folder beside the repository; `None` in a plain clone.
@@ -93,7 +105,7 @@ mod tests {
                     _ => Turning::Clockwise,
                 },
             };
-            let pieces = pieces(&core, &spiral);
+            let pieces = Turns::inside(&core, spiral).pieces;
             assert_eq!(pieces.len() as u64, case["n_pieces"].as_u64().unwrap(), "{}", case["id"]);
             let b = spiral.pitch / std::f64::consts::TAU;
             let total: f64 =
@@ -117,8 +129,13 @@ mod tests {
             })
             .collect();
         let disc = Region::from_rings([ring.as_slice()], Fill::NonZero);
-        let chords = chords(&disc, 0.4, 0.0, Turning::CounterClockwise, 0.002);
+        let spiral = Spiral { pitch: 0.4, phase: 0.0, turning: Turning::CounterClockwise };
+        let turns = Turns::inside(&disc, spiral);
+        let chords = turns.chords(0.002);
         assert!(chords[0].ends[0].is_none() && chords[0].ends[1].is_some());
         assert!(geom::polyline::length(&chords[0].points) > 750.0);
+        // The outermost turn passes everywhere inside, but not beyond the disc.
+        assert!((0..40).all(|k| turns.pass(&Point2::new(0.24 * f64::from(k), 0.1))));
+        assert!(!turns.pass(&Point2::new(0.0, 10.3)));
     }
 }
