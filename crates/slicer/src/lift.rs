@@ -25,6 +25,10 @@ pub const CHORD_MM: f64 = 0.002;
 /// How much thickness may differ from an even change along a piece, as a share of the layer's.
 const EVEN_SHARE: f64 = 0.02;
 
+/// Along a piece over edges of curved layers the ground may change by so much of a step at most: from
+/// edge to edge its depth rises and falls, which three places of a piece over several edges may miss.
+const SEEN_STEPS: f64 = 0.5;
+
 /// Pieces are not cut shorter than this for their thickness, mm.
 const SHORTEST_MM: f64 = 0.05;
 
@@ -275,13 +279,24 @@ impl Lift<'_> {
         let bulge = (middle.at - center(&a.at, &b.at)).norm();
         let uneven =
             (middle.bead.thickness - f64::midpoint(a.bead.thickness, b.bead.thickness)).abs();
-        let is_even = length < SHORTEST_MM || uneven <= EVEN_SHARE * bead.thickness;
+        let is_known =
+            uneven <= EVEN_SHARE * bead.thickness && self.is_seen([&a.at, &middle.at, &b.at]);
+        let is_even = length < SHORTEST_MM || is_known;
         if bulge <= CHORD_MM && is_even {
             return;
         }
         self.halve([line[0], half], [*a, middle], bead, stations);
         stations.push(middle);
         self.halve([half, line[1]], [middle, *b], bead, stations);
+    }
+
+    /// Returns whether no edge of a curved layer below can run unseen between places of a piece.
+    fn is_seen(&self, places: [&Point3<f64>; 3]) -> bool {
+        let Some(stair) = &self.stair else { return true };
+        let steps = places.map(|p| stair.steps(p.x.hypot(p.y)));
+        let (least, most) =
+            steps.into_iter().fold((f64::MAX, f64::MIN), |(a, b), s| (a.min(s), b.max(s)));
+        most - least <= SEEN_STEPS
     }
 }
 
@@ -380,6 +395,44 @@ mod tests {
                     assert!(off < 1.2 * CHORD_MM / cos, "{off} at {at}");
                 }
                 assert!((pair[0].bead.thickness - 0.2).abs() < 1e-6);
+            }
+        }
+    }
+
+    /// Over layers that fall gently, edges lie several beads apart.
+    #[test]
+    fn beads_over_a_stair_are_as_thick_as_the_ground_is_deep_everywhere() {
+        for angle in [4.0_f64, 6.0, 8.0, 15.0, 30.0] {
+            let angle = angle.to_radians();
+            let cone = Cone::new(angle).unwrap();
+            let stair = Stair {
+                surface: &cone,
+                level: 9.1,
+                step: 0.2 / angle.cos(),
+                floor: 0.4,
+                top: 9.4,
+                least: 0.1,
+            };
+            let level = Level { index: 50, lower: 9.2, upper: 9.4 };
+            let lift = Lift { stair: Some(stair), ..free(&Plane, level) };
+            for k in 0..40 {
+                let off = 0.4 * f64::from(k);
+                let stations = lift.stations(&line(&[[-9.0, off - 6.0], [9.0, off]]), false);
+                let mut wrong = 0.0;
+                let mut length = 0.0;
+                for pair in stations.windows(2) {
+                    let along = pair[1].at - pair[0].at;
+                    for i in 0..20 {
+                        let share = (f64::from(i) + 0.5) / 20.0;
+                        let at = pair[0].at + along * share;
+                        let depth = stair.mean_thickness(at.x.hypot(at.y), BEAD.spacing());
+                        let ends = [pair[0].bead.thickness, pair[1].bead.thickness];
+                        let laid = ends[0] + (ends[1] - ends[0]) * share;
+                        wrong += (laid - depth).abs() * along.norm() / 20.0;
+                    }
+                    length += along.norm();
+                }
+                assert!(wrong / length < 0.007, "{angle}, {off}: {} mm", wrong / length);
             }
         }
     }

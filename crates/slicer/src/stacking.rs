@@ -117,12 +117,18 @@ impl Stair<'_> {
         self.top - self.least
     }
 
+    /// Returns how many layers above that of [`level`](Self::level) the ceiling lies at distance `r` from
+    /// the axis: a whole number where one of them ends.
+    #[must_use]
+    pub fn steps(&self, r: f64) -> f64 {
+        (self.surface.level(&Point3::new(r, 0.0, self.ceiling())) - self.level) / self.step
+    }
+
     /// Returns how far the highest curved layer lies below the top at distance `r` from the axis,
     /// mm.
     #[must_use]
     pub fn thickness(&self, r: f64) -> f64 {
-        let highest = self.surface.level(&Point3::new(r, 0.0, self.ceiling()));
-        let steps = ((highest - self.level) / self.step + STEP_SLACK).floor();
+        let steps = (self.steps(r) + STEP_SLACK).floor();
         let ground = self.surface.height(self.level + steps * self.step, r);
         let ground = if ground.is_finite() { ground.max(self.floor) } else { self.floor };
         self.top - ground.max(self.end_face(r, self.level + (steps + 1.0) * self.step))
