@@ -58,7 +58,7 @@ pub fn roughened(
             if !room(&(at + inwards * (2.0 * params.depth))) {
                 depth = 0.0;
             }
-            rough.push((at + inwards * depth, bead));
+            rough.push(Rough { at: at + inwards * depth, bead, is_tip: false });
             // Half to one and a half steps.
             along += params.step * (0.5 + random.next());
         }
@@ -71,32 +71,50 @@ pub fn roughened(
         };
         if side.perp(&(next - to)) < 0.0 {
             let is_free = room(&(to + inwards * (2.0 * params.depth)));
-            rough.push((to + inwards * if is_free { depth } else { 0.0 }, *to_bead));
+            let at = to + inwards * if is_free { depth } else { 0.0 };
+            rough.push(Rough { at, bead: *to_bead, is_tip: false });
         } else if is_narrow() {
             // A tip that is cut off would have its sides lie on each other.
-            rough.push((*to, *to_bead));
+            rough.push(Rough { at: *to, bead: *to_bead, is_tip: true });
         }
     }
     leave_out_spikes(&mut rough, params.depth);
     // A line too short for it stays as it is.
-    if rough.len() < 3 { line.to_vec() } else { rough }
+    if rough.len() < 3 {
+        return line.to_vec();
+    }
+    rough.into_iter().map(|point| (point.at, point.bead)).collect()
+}
+
+/// A point of a rough line.
+struct Rough {
+    at: Point2<f64>,
+    bead: Bead,
+    /// Whether the part ends there.
+    is_tip: bool,
 }
 
 /// A closed line that turns by more than this runs back over itself, radians: 175°.
 const SPIKE: f64 = 175.0 * std::f64::consts::PI / 180.0;
 
+/// The same where a side is so short (mm) that the last places of a program can make it point elsewhere.
+const SHORT_SPIKE: f64 = 140.0 * std::f64::consts::PI / 180.0;
+const SHORT_MM: f64 = 0.1;
+
 /// Leaves out points from which a closed line runs back over the way it came: where a side is short, or at a
 /// corner, the next point may lie behind the one before. No such spike is longer than `depth` by much.
-fn leave_out_spikes(line: &mut Vec<(Point2<f64>, Bead)>, depth: f64) {
+fn leave_out_spikes(line: &mut Vec<Rough>, depth: f64) {
     let mut k = 0;
     // How many points in a row are known to be none; without one, its neighbours may be some.
     let mut sound = 0;
     while line.len() > 3 && sound < line.len() {
         let n = line.len();
         k %= n;
-        let (into, out) = (line[k].0 - line[(k + n - 1) % n].0, line[(k + 1) % n].0 - line[k].0);
-        let is_short = into.norm().min(out.norm()) <= 2.0 * depth;
-        if is_short && into.angle(&out) > SPIKE {
+        let [before, at, after] = [k + n - 1, k, k + 1].map(|k| line[k % n].at);
+        let (into, out) = (at - before, after - at);
+        let shorter = into.norm().min(out.norm());
+        let most = if shorter < SHORT_MM { SHORT_SPIKE } else { SPIKE };
+        if !line[k].is_tip && shorter <= 2.0 * depth && into.angle(&out) > most {
             line.remove(k);
             sound = 0;
             k = (k + n - 2) % (n - 1);
