@@ -113,8 +113,9 @@ fn leave_out_spikes(line: &mut Vec<Rough>, depth: f64) {
         let [before, at, after] = [k + n - 1, k, k + 1].map(|k| line[k % n].at);
         let (into, out) = (at - before, after - at);
         let shorter = into.norm().min(out.norm());
-        let most = if shorter < SHORT_MM { SHORT_SPIKE } else { SPIKE };
-        if !line[k].is_tip && shorter <= 2.0 * depth && into.angle(&out) > most {
+        let is_doubtful = shorter < SHORT_MM && !line[k].is_tip;
+        let most = if is_doubtful { SHORT_SPIKE } else { SPIKE };
+        if shorter <= 2.0 * depth && into.angle(&out) > most {
             line.remove(k);
             sound = 0;
             k = (k + n - 2) % (n - 1);
