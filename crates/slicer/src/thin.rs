@@ -281,23 +281,6 @@ impl AxisGraph {
                     self.links[pair[0]].retain(|&n| n != pair[1]);
                     self.links[pair[1]].retain(|&n| n != pair[0]);
                 }
-                self.bypass_if_sharp(at);
-            }
-        }
-    }
-
-    /// Leaves out a hub that has lost a branch, where the line turns sharply at it: it lies off the middle,
-    /// towards the branch, and its neighbours may be nearer to each other than to it.
-    fn bypass_if_sharp(&mut self, hub: usize) {
-        let [a, b] = self.links[hub][..] else { return };
-        let at = |node: usize| self.nodes[node].at;
-        if a == b || (at(hub) - at(a)).dot(&(at(b) - at(hub))) >= 0.0 {
-            return;
-        }
-        self.links[hub].clear();
-        for (node, other) in [(a, b), (b, a)] {
-            for link in self.links[node].iter_mut().filter(|link| **link == hub) {
-                *link = other;
             }
         }
     }
@@ -358,29 +341,6 @@ mod tests {
             .flat_map(|line| line.windows(2))
             .map(|w| distance(&w[0].at, &w[1].at) * f64::midpoint(w[0].width, w[1].width))
             .sum()
-    }
-
-    #[test]
-    fn a_bead_past_a_dent_or_a_bump_does_not_run_back() {
-        for k in 0..400 {
-            let (wide, deep) = (0.02 + 0.003 * f64::from(k % 40), 0.012 * f64::from(k / 40) - 0.06);
-            let at = 3.0 + 0.007 * f64::from(k);
-            let strip = polygon(&[
-                [0.0, 0.0],
-                [12.0, 0.0],
-                [12.0, 0.5],
-                [at + wide, 0.5],
-                [at + wide * 0.6, 0.5 + deep],
-                [at, 0.5],
-                [0.0, 0.5],
-            ]);
-            for line in axes(&strip, &mut LostArea::default()) {
-                for w in line.windows(3) {
-                    let turn = (w[1].at - w[0].at).angle(&(w[2].at - w[1].at)).to_degrees();
-                    assert!(turn < 120.0, "{wide} {deep}: {turn}° at {}", w[1].at);
-                }
-            }
-        }
     }
 
     #[test]
