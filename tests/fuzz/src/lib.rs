@@ -45,7 +45,7 @@ fn said(failure: &Failure) {
 /// Mends what was read; what comes out is closed, finite and has a volume.
 fn mend(soup: &Soup) {
     let Ok((solid, _)) = mesh::health::solid_from_soup(soup) else { return };
-    let volume = rhumb::place::volume(solid.mesh());
+    let volume = solid.volume_mm3();
     assert!(volume.is_finite(), "volume {volume}");
 }
 
