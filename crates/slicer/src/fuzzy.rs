@@ -90,7 +90,7 @@ pub fn roughened(
 struct Rough {
     at: Point2<f64>,
     bead: Bead,
-    /// Whether the part ends there.
+    /// Whether it is the end of a slender tip, where a sharp turn is the part's own.
     is_tip: bool,
 }
 
