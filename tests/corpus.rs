@@ -2,7 +2,8 @@
 //! a class, a status, its facts and nothing left behind, within limits of memory and time.
 //!
 //! `corpus/make.py` writes the cases and the list; it needs Python and no more. With `RHUMB_CORPUS=all`
-//! the large ones are written and run too (1 GB of disk, minutes).
+//! the slow ones are run too, with `RHUMB_CORPUS=slow` these alone (1 GB of disk, minutes).
+//! `RHUMB_BINARY` names another build to run, a release: the limits of time are then as they stand.
 
 mod environment;
 mod meshes;
@@ -32,6 +33,45 @@ const MACHINE: [&str; 8] = [
 /// A build for tests is this much slower than a release, which the limits of time are meant for.
 const SLOWER: u64 = 8;
 
+/// Cases for a release build: thousands of parts too small for a bead, hundreds of shells within each
+/// other, and files of up to a gigabyte.
+const SLOW: [&str; 6] = [
+    "stl/shells_10k",
+    "stl/concentric_250",
+    "stl/big_1M",
+    "stl/sparse_1GiB",
+    "gcode/single_line_100MB",
+    "gcode/big_3M_lines",
+];
+
+/// Which cases `RHUMB_CORPUS` asks for.
+#[derive(Clone, Copy, PartialEq)]
+enum Wanted {
+    Quick,
+    Slow,
+    All,
+}
+
+impl Wanted {
+    fn get() -> Self {
+        match std::env::var("RHUMB_CORPUS").as_deref() {
+            Err(_) => Self::Quick,
+            Ok("slow") => Self::Slow,
+            Ok("all") => Self::All,
+            Ok(other) => panic!("RHUMB_CORPUS={other} is neither slow nor all"),
+        }
+    }
+
+    fn has(self, id: &str) -> bool {
+        self == Self::All || SLOW.contains(&id) == (self == Self::Slow)
+    }
+}
+
+/// A release build to run, if one is named.
+fn release() -> Option<PathBuf> {
+    std::env::var_os("RHUMB_BINARY").map(|binary| root().join(binary))
+}
+
 /// The corpus: where its files lie, and what is expected of them.
 struct Corpus {
     folder: PathBuf,
@@ -54,7 +94,7 @@ impl Corpus {
         std::fs::create_dir_all(&folder).unwrap();
         let mut make = Command::new("python3");
         make.arg(root().join("tests/corpus/make.py")).arg(&folder);
-        if wants_all() {
+        if Wanted::get() != Wanted::Quick {
             make.arg("--big");
         }
         let output = make.output().ok()?;
@@ -63,20 +103,20 @@ impl Corpus {
         Some(Self { folder, expectations: serde_json::from_str(&text).unwrap() })
     }
 
-    /// The cases of some kinds.
+    /// The cases of some kinds that are wanted.
     fn cases<'a>(&'a self, kinds: &'a [&str]) -> impl Iterator<Item = &'a Value> {
+        let wanted = Wanted::get();
         let cases = self.expectations["cases"].as_array().unwrap().iter();
-        cases.filter(|case| kinds.contains(&case["kind"].as_str().unwrap()))
+        cases.filter(move |case| {
+            kinds.contains(&case["kind"].as_str().unwrap())
+                && wanted.has(case["id"].as_str().unwrap())
+        })
     }
 
     /// The name of a case and its file.
     fn file<'a>(&self, case: &'a Value) -> (&'a str, PathBuf) {
         (case["id"].as_str().unwrap(), self.folder.join(case["file"].as_str().unwrap()))
     }
-}
-
-fn wants_all() -> bool {
-    std::env::var("RHUMB_CORPUS").is_ok_and(|value| value == "all")
 }
 
 /// Cases that end otherwise, on purpose. `docs/corpus.md` says why, under the same names.
@@ -102,18 +142,20 @@ fn end(ran: &Ran) -> String {
     }
 }
 
+/// The texts that a case lists under a name.
+fn texts(case: &Value, name: &str) -> Vec<String> {
+    let all = case[name].as_array().into_iter().flatten();
+    all.filter_map(Value::as_str).map(str::to_owned).collect()
+}
+
 /// What is wrong with the end of a run, as far as every kind of case is judged alike.
 fn faults(case: &Value, ran: &Ran) -> Vec<String> {
     let id = case["id"].as_str().unwrap();
     let end = end(ran);
     let wanted = case["error"].as_str().unwrap_or("0");
-    let texts = |name: &str| {
-        let all = case[name].as_array().into_iter().flatten();
-        all.filter_map(Value::as_str).map(str::to_owned).collect::<Vec<_>>()
-    };
     let mut faults = Vec::new();
     let is_otherwise = OTHERWISE.contains(&(id, end.as_str()));
-    let is_as_good = texts("also").contains(&end);
+    let is_as_good = texts(case, "also").contains(&end);
     if end != wanted && !is_otherwise && !is_as_good {
         faults.push(format!("{id} ends with {end} and not {wanted}: {:?} {}", ran.code, ran.err));
     }
@@ -147,15 +189,19 @@ fn mentions(text: &str, words: &str) -> bool {
 /// Runs rhumb within the limits of a case, on its address space and its time.
 fn limited(scratch: &Scratch, case: &Value, arguments: &[&str]) -> Ran {
     let limit = |name: &str| case["limits"][name].as_u64().unwrap();
-    // Addresses are no memory: threads and mapped files take more of them.
+    // Addresses are no memory: mapped files take more of them, and threads, of which each would have a
+    // share of 64 MB for itself alone.
     let kb = 2 * limit("rss_mb") * 1024;
-    let seconds = SLOWER * limit("seconds");
+    let binary = release();
+    let seconds = if binary.is_some() { 1 } else { SLOWER } * limit("seconds");
     let mut shell = Command::new("sh");
     shell
         .current_dir(scratch.path(""))
         .env("SOURCE_DATE_EPOCH", "1700000000")
-        .args(["-c", &format!("ulimit -v {kb}; ulimit -t {seconds}; exec \"$0\" \"$@\"")])
-        .arg(env!("CARGO_BIN_EXE_rhumb"))
+        .env("MALLOC_ARENA_MAX", "1")
+        // The shell outlives what it runs, and tells a signal by a status over 128.
+        .args(["-c", &format!("ulimit -v {kb}; ulimit -t {seconds}; \"$0\" \"$@\"; exit $?")])
+        .arg(binary.as_deref().unwrap_or(Path::new(env!("CARGO_BIN_EXE_rhumb"))))
         .args(arguments)
         .stdin(std::process::Stdio::null());
     let output = if cfg!(target_os = "linux") {
