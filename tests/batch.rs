@@ -103,6 +103,14 @@ fn what_is_wrong_for_all_is_said_before_any_work() {
     scratch.cube("a.stl", 2.0);
     let ran = scratch.run(&["batch", "models", "a.stl", "--out-dir", "other"]);
     ran.refused("OutputTwice", 7);
+    // A pipe is empty once it was read to see whether the model has changed.
+    #[cfg(unix)]
+    {
+        let made = std::process::Command::new("mkfifo").arg(scratch.path("pipe.stl")).status();
+        assert!(made.unwrap().success());
+        let ran = scratch.run(&["batch", "models", "pipe.stl", "--out-dir", "other"]);
+        ran.refused("NotRegularFile", 3);
+    }
     assert!(!scratch.path("other").exists());
 }
 

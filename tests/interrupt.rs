@@ -51,6 +51,30 @@ fn a_terminated_run_leaves_nothing_behind() {
     stops_on("TERM");
 }
 
+/// Whoever forgot to pipe a model in presses Ctrl-C.
+#[test]
+fn a_run_that_waits_for_a_pipe_can_be_stopped() {
+    for command in ["slice", "convert"] {
+        let scratch = Scratch::new();
+        let mut waiting = scratch.rhumb(&[command, "-", "-o", "x.gcode"]);
+        let mut child = waiting.stdin(Stdio::piped()).spawn().unwrap();
+        // Time to begin with reading.
+        std::thread::sleep(Duration::from_millis(500));
+        let sent =
+            Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        let asked = Instant::now();
+        while child.try_wait().unwrap().is_none() {
+            if asked.elapsed() > PATIENCE {
+                child.kill().unwrap();
+                panic!("{command} goes on waiting");
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert!(scratch.names().is_empty(), "{:?}", scratch.names());
+    }
+}
+
 #[test]
 fn a_batch_that_is_asked_to_stop_keeps_what_is_finished() {
     let scratch = Scratch::new();

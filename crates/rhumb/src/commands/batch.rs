@@ -101,6 +101,7 @@ fn models(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut models = Vec::new();
     for path in named {
         if !path.is_dir() {
+            can_be_read_again(path)?;
             models.push(path.clone());
             continue;
         }
@@ -112,7 +113,7 @@ fn models(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         let is_model = |file: &PathBuf| {
             let ending = file.extension().and_then(|ending| ending.to_str());
             ending.is_some_and(|ending| ENDINGS.iter().any(|e| e.eq_ignore_ascii_case(ending)))
-                && !file.is_dir()
+                && file.is_file()
         };
         inside.retain(is_model);
         // The order of a folder is the file system's own.
@@ -126,6 +127,15 @@ fn models(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         )));
     }
     Ok(models)
+}
+
+/// Refuses pipes and devices: a model is read to see whether it has changed, and again to be sliced.
+fn can_be_read_again(path: &Path) -> Result<(), Failure> {
+    if fs::metadata(path).is_ok_and(|metadata| !metadata.is_file()) {
+        let what = format!("{} is no file that can be read twice", path.display());
+        return Err(Failure::new("NotRegularFile", what).hint("slice it by itself"));
+    }
+    Ok(())
 }
 
 /// Where the program of each model goes.

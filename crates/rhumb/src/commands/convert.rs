@@ -23,9 +23,10 @@ use crate::report::SlowFlow;
 use crate::settings::Job;
 
 pub(super) fn run(arguments: &Convert, manner: &Manner) -> Result<u8, Failure> {
-    let interrupt = Interrupt::on_signals();
     let job = upright(settings(&arguments.settings)?.1);
     let source = Source::open(&arguments.program)?;
+    // Until here a signal ends the process at once: a pipe may keep it waiting, and nothing is begun.
+    let interrupt = Interrupt::on_signals();
     let name = display_name(&arguments.program);
     let origin = match arguments.origin.as_str() {
         "auto" => middle(source.reader()?, &name)?,

@@ -29,10 +29,6 @@ use crate::stopwatch::Stopwatch;
 use crate::summary;
 
 pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
-    let interrupt = Interrupt::on_signals();
-    if arguments.stop_at_end_of_input {
-        interrupt.raise_at_end_of_input();
-    }
     let mut total = Stopwatch::start();
     let mut wanted = arguments.settings.clone();
     wanted.set.extend(arguments.layers.set());
@@ -45,6 +41,11 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     let target = target(arguments);
     let inputs: Vec<&Path> = arguments.models.iter().map(PathBuf::as_path).collect();
     let models = models(&inputs)?;
+    // Until here a signal ends the process at once: a pipe may keep it waiting, and nothing is begun.
+    let interrupt = Interrupt::on_signals();
+    if arguments.stop_at_end_of_input {
+        interrupt.raise_at_end_of_input();
+    }
     let mut out = Output::create(&target, &inputs)?;
     let beside = |path: &Option<PathBuf>| path.as_deref().map(|p| Output::create(p, &inputs));
     let report_file = beside(&arguments.report).transpose()?;
