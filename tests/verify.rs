@@ -205,6 +205,40 @@ fn every_damage_is_found_by_its_check() {
     }
 }
 
+/// The upper half is missing, and so is the line that says how much filament all of it takes.
+#[test]
+fn half_a_print_is_found_whatever_its_text_says() {
+    let printed = Printed::new("cube", &[]);
+    let starts: Vec<usize> =
+        (0..printed.lines.len()).filter(|&at| printed.lines[at] == ";LAYER_CHANGE").collect();
+    let laid = |line: &String| line.starts_with("G1") && line.contains(" E");
+    let end = printed.lines.iter().rposition(laid).unwrap() + 1;
+    let mut lines = printed.lines[..starts[starts.len() / 2]].to_vec();
+    lines.extend_from_slice(&printed.lines[end..]);
+    lines.retain(|line| !line.contains("filament used"));
+    let verdict = printed.judged(&lines, &[]);
+    assert!(verdict.checks.iter().any(|found| found == "height"), "{:?}", verdict.checks);
+    assert_eq!(verdict.code, Some(1));
+}
+
+/// What a download leaves that went wrong.
+#[test]
+fn a_program_of_nothing_proves_nothing() {
+    let scratch = Scratch::new();
+    scratch.file("empty.gcode", "");
+    scratch.file("blank.gcode", "\n\n");
+    scratch.cube("cube.stl", 5.0);
+    for command in [
+        &["verify", "empty.gcode"][..],
+        &["steps", "empty.gcode", "-o", "x.csv"],
+        &["preview", "empty.gcode", "-o", "x.svg"],
+    ] {
+        scratch.run(command).refused("EmptyFile", 4);
+    }
+    let ran = scratch.run(&["verify", "blank.gcode", "--model", "cube.stl"]).expect(1);
+    assert!(ran.out.starts_with("height: "), "{}", ran.out);
+}
+
 #[test]
 fn holes_and_lines_laid_twice_are_found() {
     let printed = Printed::new("cube", &["--set", "fill_density=1"]);

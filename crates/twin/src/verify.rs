@@ -37,6 +37,7 @@ use crate::check::deposit::{Deposit, Solid};
 use crate::check::flow::Flow;
 use crate::check::head::HeadCheck;
 use crate::check::heat::Heat;
+use crate::check::height;
 use crate::check::modes::Modes;
 use crate::check::reach::Reach;
 use crate::check::speed::Speed;
@@ -240,6 +241,16 @@ impl<'a> Verifier<'a> {
         let is_open = || mesh.is_some_and(has_holes);
         let unjudged = self.volume.end(enclosed, is_open, self.setup.solid, &mut self.findings);
         let mut notes: Vec<&'static str> = unjudged.into_iter().collect();
+        if let Some(mesh) = mesh {
+            let laid = (self.volume.layers(), self.volume.has_laid());
+            height::check(
+                mesh,
+                laid,
+                self.setup.printer.nozzle_diameter,
+                place,
+                &mut self.findings,
+            );
+        }
         if self.setup.dialect.space == Space::Part {
             notes.push(
                 "speed, acceleration: the firmware turns these words into joints itself, so \

@@ -12,13 +12,12 @@ use twin::ramps::Clock;
 use twin::segment::Segment;
 use twin::verify::Verdict;
 
-use super::verify::{job_of, names_itself, part};
+use super::verify::{job_of, names_itself, part, read_program};
 use super::{DONE, display_name, write_file};
 use crate::args::{Coloring, DepositView, Plot, Preview};
 use crate::check::{check, findings};
 use crate::convert::{middle, segments};
 use crate::failure::Failure;
-use crate::input;
 use crate::page::columns::Columns;
 use crate::page::{About, page};
 use crate::report;
@@ -78,7 +77,7 @@ struct Reading {
 
 impl<'a> Program<'a> {
     fn read(arguments: &'a Preview) -> Result<Self, Failure> {
-        let bytes = input::read(&arguments.program)?;
+        let bytes = read_program(&arguments.program)?;
         let settings = &arguments.settings;
         let is_told = settings.dialect.is_some() || settings.printer.is_some();
         Ok(Self {

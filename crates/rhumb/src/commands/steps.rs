@@ -12,12 +12,11 @@ use twin::steps::program::{NoJoints, Step, Stepper};
 use twin::steps::report::Report;
 use twin::steps::{Axes, Interval, MOST_AXES, csv, table};
 
-use super::verify::job_of;
+use super::verify::{job_of, read_program};
 use super::{DONE, say, say_json, write_file};
 use crate::args::{Manner, PhaseSequence, SettingsArguments, Steps};
 use crate::check::each_line;
 use crate::failure::Failure;
-use crate::input;
 use crate::output::{self, Output};
 use crate::program_text::duration;
 use crate::settings::Job;
@@ -101,7 +100,7 @@ impl Source {
             };
             return Self::table(table::EXAMPLE.as_bytes(), &defaults);
         };
-        let bytes = input::read(path)?;
+        let bytes = read_program(path)?;
         if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
             return Self::table(&bytes, &arguments.settings);
         }

@@ -20,7 +20,7 @@ use crate::program_text::duration;
 use crate::settings::Job;
 
 pub(super) fn run(arguments: &Verify, manner: &Manner) -> Result<u8, Failure> {
-    let program = input::read(&arguments.program)?;
+    let program = read_program(&arguments.program)?;
     let job = job_of(&program, &arguments.settings)?;
     let part = arguments.model.as_deref().map(part).transpose()?;
     let mut lag = arguments.load_angle.then(|| Lag::new(job.bed_drive));
@@ -195,6 +195,15 @@ fn laid(thorough: &Thorough) -> String {
         thorough.laid_twice,
         thorough.deepest_touch
     )
+}
+
+/// Reads a program. A file of nothing is what a download leaves that went wrong, and proves nothing.
+pub(super) fn read_program(path: &Path) -> Result<Vec<u8>, Failure> {
+    let bytes = input::read(path)?;
+    if bytes.is_empty() {
+        return Err(Failure::new("EmptyFile", format!("{} is empty", path.display())));
+    }
+    Ok(bytes)
 }
 
 /// The settings to judge a program by: the dialect and the filament are those that it names itself

@@ -7,8 +7,8 @@
 //!
 //! On the text: [`text`], [`modes`], [`declared`]. On the machine: [`reach`], [`axis`], [`speed`],
 //! [`acceleration`], [`mod@head`], [`heat`]. On the part: [`continuity`], [`surface`],
-//! [`flow`], [`volume`], [`deposit`]. On what lies below and around, where a full proof is asked for:
-//! [`support`], [`overlap`], [`coverage`], [`clearance`].
+//! [`flow`], [`volume`], [`height`], [`deposit`]. On what lies below and around, where a full proof is
+//! asked for: [`support`], [`overlap`], [`coverage`], [`clearance`].
 
 pub mod acceleration;
 pub mod axis;
@@ -20,6 +20,7 @@ pub mod deposit;
 pub mod flow;
 pub mod head;
 pub mod heat;
+pub mod height;
 pub mod modes;
 pub mod overlap;
 pub mod reach;

@@ -180,6 +180,11 @@ impl Volume {
         self.filament
     }
 
+    /// Whether anything was laid at all.
+    pub(crate) fn has_laid(&self) -> bool {
+        self.by_role.iter().any(|filament| *filament > 0.0)
+    }
+
     /// Returns the material laid for each role, mm³.
     #[must_use]
     pub(crate) fn by_role(&self) -> [(Role, f64); Role::ALL.len()] {
