@@ -53,6 +53,9 @@ pub(super) enum ReadError {
     /// A motion that has no polar form.
     #[error("{0} moves the machine in a way that is not understood")]
     ForeignMotion(String),
+    /// A word that moves what no Cartesian printer has, as in a program that is polar already.
+    #[error("{0} is an axis beside X, Y, Z and E, and nobody knows what it moves")]
+    ForeignAxis(char),
     /// A feed rate that never arrives.
     #[error("F must be above 0, not {0}")]
     Feed(f64),
@@ -78,7 +81,9 @@ impl ReadError {
     /// The class of failure that it is.
     pub(super) fn class(&self) -> &'static str {
         match self {
-            Self::OtherPlane | Self::Foreign(_) | Self::ForeignMotion(_) => "GcodeUnsupported",
+            Self::OtherPlane | Self::Foreign(_) | Self::ForeignMotion(_) | Self::ForeignAxis(_) => {
+                "GcodeUnsupported"
+            }
             Self::TooHot { .. } => "OutOfEnvelope",
             _ => "GcodeSyntax",
         }
@@ -118,6 +123,12 @@ const FIRST_SPEED_MM_S: f64 = 25.0;
 
 /// Filament moves alone in pieces shorter than this, mm: Klipper refuses 50.
 const LONGEST_FILAMENT_MM: f64 = 49.0;
+
+/// Words of axes that only other machines have.
+const FOREIGN_AXES: &[u8] = b"ABCTUVW";
+
+/// The same on lines, where `R` is no radius.
+const FOREIGN_AXES_OF_LINES: &[u8] = b"ABCRTUVW";
 
 /// Most filament in a line, mm: a third of a usual spool. Each piece of it is a move of its own.
 const MOST_FILAMENT_MM: f64 = 1e5;
@@ -259,6 +270,11 @@ impl Reader {
         command: &Command<'_>,
         strokes: &mut Vec<Stroke>,
     ) -> Result<(), ReadError> {
+        let is_arc = self.motion > 1;
+        let axes = if is_arc { FOREIGN_AXES } else { FOREIGN_AXES_OF_LINES };
+        if let Some(axis) = axes.iter().find(|axis| command.word(**axis).is_some()) {
+            return Err(ReadError::ForeignAxis(char::from(*axis)));
+        }
         if let Some(speed) = command.word(b'F') {
             if speed <= 0.0 {
                 return Err(ReadError::Feed(speed));
@@ -270,7 +286,6 @@ impl Reader {
         if filament.abs() > MOST_FILAMENT_MM {
             return Err(ReadError::Filament(filament));
         }
-        let is_arc = self.motion > 1;
         if to == self.at && filament == 0.0 && !is_arc {
             return Ok(());
         }
@@ -524,6 +539,10 @@ mod tests {
             let name = foreign.split(' ').next().unwrap().to_owned();
             assert_eq!(line(foreign), Err(ReadError::ForeignMotion(name)));
         }
+        // What a program for a polar printer says, and one for a turning head.
+        assert_eq!(line("G1 X50 T-3 E1"), Err(ReadError::ForeignAxis('T')));
+        assert_eq!(line("G1 R50 E1"), Err(ReadError::ForeignAxis('R')));
+        assert_eq!(line("G0 X1 C90"), Err(ReadError::ForeignAxis('C')));
         assert_eq!(line("G1 X5 F0"), Err(ReadError::Feed(0.0)));
         assert!(line("G1 X5 X6").unwrap_err().to_string().contains("twice"));
         assert!(line("G1 X-2e1 E3").unwrap_err().to_string().contains("twice"));
