@@ -135,3 +135,28 @@ fn settings_of_prusaslicer_become_profiles() {
         (&"4".into(), &"fill_pattern".into())
     );
 }
+
+/// What the proof would find in the finished program, hours later.
+#[test]
+fn temperatures_beyond_the_printers_are_told_before_any_work() {
+    let scratch = Scratch::new();
+    scratch.cube("cube.stl", 5.0);
+    for set in [
+        "temperature_c=400",
+        "first_layer_temperature_c=400",
+        "temperature_c=120",
+        "bed_temperature_c=150",
+        "first_layer_bed_temperature_c=150",
+        "max_nozzle_temperature_c=150",
+        "min_extrude_temperature_c=250",
+        "retract_restart_extra_mm=-2",
+    ] {
+        let ran = scratch.run(&["slice", "cube.stl", "-o", "x.gcode", "--set", set]);
+        ran.refused("ConfigConflict", 6);
+    }
+    // Lines may stray from their way by as much as the proof lets pass.
+    let coarse = ["slice", "cube.stl", "-q", "-o", "x.gcode", "--set", "chord_mm=0.05"];
+    scratch.run(&coarse).expect(0);
+    let too_coarse = ["slice", "cube.stl", "-o", "x.gcode", "--set", "chord_mm=0.06"];
+    scratch.run(&too_coarse).refused("ConfigRange", 6);
+}

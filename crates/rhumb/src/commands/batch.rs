@@ -26,7 +26,7 @@ use crate::args::{Batch, Manner};
 use crate::failure::Failure;
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::settings::{KEYS, Settings};
+use crate::settings::{KEYS, Settings, material};
 
 /// What models are called, in folders.
 const ENDINGS: &[&str] = &["stl", "3mf", "obj"];
@@ -51,6 +51,7 @@ pub(super) fn run(arguments: &Batch, manner: &Manner) -> Result<u8, Failure> {
     wanted.set.extend(arguments.layers.set());
     // A setting that is wrong is wrong for all models.
     let (settings, _) = settings(&wanted)?;
+    material::check(&settings)?;
     wish(&arguments.place)?;
     let shard = Shard::parse(arguments.shard.as_deref())?;
     let models = shard.of(models(&arguments.models)?);

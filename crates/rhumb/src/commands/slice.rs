@@ -24,7 +24,7 @@ use crate::pipeline::{self, Outcome, Request, Watch};
 use crate::place::parse_place;
 use crate::progress::{Bars, Progress, Silent};
 use crate::report::Report;
-use crate::settings::Job;
+use crate::settings::{Job, material};
 use crate::stopwatch::Stopwatch;
 use crate::summary;
 
@@ -33,6 +33,7 @@ pub(super) fn run(arguments: &Slice, manner: &Manner) -> Result<u8, Failure> {
     let mut wanted = arguments.settings.clone();
     wanted.set.extend(arguments.layers.set());
     let (settings, mut job) = settings(&wanted)?;
+    material::check(&settings)?;
     job.most_cuts = arguments.effort.most_cuts * 1e6;
     job.draws_arcs = draws_arcs(arguments, &job)?;
     let wish = wish(&arguments.place)?;

@@ -12,6 +12,7 @@ mod head;
 pub mod key;
 mod lookup;
 mod machine;
+pub mod material;
 pub mod merge;
 mod motion;
 pub mod orca;

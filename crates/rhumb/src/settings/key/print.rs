@@ -589,7 +589,7 @@ pub(super) const KEYS: &[Key] = &[
         Print,
         "chord_mm",
         "chord",
-        (0.005, 0.0005, 1.0),
+        (0.005, 0.0005, 0.05),
         "how far the nozzle may lie from its line between two points of the program",
     ),
     number(Print, "travel_chord_mm", "travel_chord", (0.1, 0.0005, 5.0), "the same for travel"),
