@@ -1,10 +1,10 @@
 //! How much memory and time a file may cost: never more than in proportion to its bytes, whatever
 //! numbers stand in it.
 
-use std::process::Stdio;
+use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
-use crate::run::{Scratch, model, say};
+use crate::run::{Ran, Scratch, model, say};
 
 #[test]
 fn work_for_hours_is_refused_before_it_begins() {
@@ -85,6 +85,27 @@ fn few_addresses_are_enough() {
     limited(&scratch, 150, line, &[0, 1]);
 }
 
+/// With fewer the user is told so, before anything is written.
+#[cfg(target_os = "linux")]
+#[test]
+fn too_few_addresses_are_told() {
+    let scratch = Scratch::new();
+    let [(name, ball), _] = balls(7);
+    let mb = ball.len() as f64 / f64::from(1 << 20);
+    scratch.file(name, ball);
+    scratch.cube("cube.stl", 5.0);
+    let works = |mb: &usize| with_addresses(&scratch, *mb, "slice cube.stl -o -").status.success();
+    let program = (16..1024).step_by(2).find(works).expect("a gigabyte is enough for a cube");
+    // Enough for half of the file, for the file, and for its facets beside it.
+    for share in [0.5, 1.4, 1.9] {
+        let addresses = program + (share * mb) as usize;
+        let line = format!("slice {name} -o x.gcode");
+        let ran = Ran::from(with_addresses(&scratch, addresses, &line));
+        ran.refused("LimitExceeded", 8);
+        assert_eq!(scratch.names(), [name, "cube.stl"], "{share}");
+    }
+}
+
 /// The greatest memory that a run takes, MB; `None` where the system does not tell.
 fn peak_mb(scratch: &Scratch, line: &str) -> Option<usize> {
     let arguments: Vec<&str> = line.split(' ').chain(["-q", "--threads", "2"]).collect();
@@ -111,15 +132,16 @@ fn limited(scratch: &Scratch, mb: usize, line: &str, statuses: &[i32]) {
     if !cfg!(target_os = "linux") {
         return;
     }
-    let kb = 2 * mb * 1024;
-    let binary = env!("CARGO_BIN_EXE_rhumb");
-    let line = format!("ulimit -v {kb}; exec \"{binary}\" {line} -q --threads 1");
-    let output = std::process::Command::new("sh")
-        .current_dir(scratch.path(""))
-        .args(["-c", &line])
-        .output()
-        .unwrap();
+    let output = with_addresses(scratch, 2 * mb, line);
     let said = String::from_utf8_lossy(&output.stderr);
     let is_expected = output.status.code().is_some_and(|code| statuses.contains(&code));
     assert!(is_expected, "{line}: {} {said}", output.status);
+}
+
+/// Runs rhumb on one thread with an address space of so many MB.
+fn with_addresses(scratch: &Scratch, mb: usize, line: &str) -> Output {
+    let kb = mb * 1024;
+    let binary = env!("CARGO_BIN_EXE_rhumb");
+    let line = format!("ulimit -v {kb}; exec \"{binary}\" {line} -q --threads 1");
+    Command::new("sh").current_dir(scratch.path("")).args(["-c", &line]).output().unwrap()
 }

@@ -75,6 +75,7 @@ impl Default for Arrangement {
 pub fn read(model: &Model<'_>, wish: &Wish) -> Result<Given, Failure> {
     let mut given = model::read(model.format, &model.bytes)
         .map_err(|error| unusable(error.class(), &error, error.hint()).about(model.name))?;
+    has_room(given.soup.facets.len()).map_err(|failure| failure.about(model.name))?;
     if wish.scale != 1.0 {
         given.soup = given.soup.scaled(wish.scale);
     }
@@ -82,6 +83,19 @@ pub fn read(model: &Model<'_>, wish: &Wish) -> Result<Given, Failure> {
         mirror(&mut given, wish.mirror);
     }
     Ok(given)
+}
+
+/// Memory that no mesh of so many facets does with less than, beside the facets, bytes for each.
+const LEAST_ROOM: usize = 48;
+
+/// Sees that there is memory to make a mesh of so many facets: where it ends later, the process ends with it
+/// and says nothing that a user understands.
+fn has_room(facets: usize) -> Result<(), Failure> {
+    let room = Vec::<u8>::new().try_reserve_exact(facets.saturating_mul(LEAST_ROOM));
+    room.map_err(|_| {
+        Failure::new("LimitExceeded", format!("there is no memory for a mesh of {facets} facets"))
+            .hint("export the model with fewer facets")
+    })
 }
 
 /// Mirrors along some axes; what was outside stays outside.

@@ -22,7 +22,9 @@ const SLICE: usize = 1 << 16;
 pub(super) fn read(bytes: &[u8]) -> Result<(Soup, ReadReport), StlError> {
     let (n_facets, count_note) = settle_count(bytes)?;
     let body = &bytes[HEADER..HEADER + FACET * n_facets];
-    let mut facets: Vec<Facet> = vec![[[0.0; 3]; 3]; n_facets];
+    let mut facets: Vec<Facet> = Vec::new();
+    facets.try_reserve_exact(n_facets).map_err(|_| StlError::NoMemory { facets: n_facets })?;
+    facets.resize(n_facets, Facet::default());
     let slices: Vec<Result<Normals, StlError>> = facets
         .par_chunks_mut(SLICE)
         .zip(body.par_chunks(SLICE * FACET))

@@ -69,6 +69,12 @@ pub enum StlError {
     /// The file is an STL without a single facet.
     #[error("the file has no facets")]
     NoTriangles,
+    /// The facets are there, and no memory for them.
+    #[error("there is no memory for {facets} facets")]
+    NoMemory {
+        /// How many they are.
+        facets: usize,
+    },
 }
 
 /// A place in a file.
@@ -109,6 +115,7 @@ impl StlError {
             Self::NotFinite { .. } => "NotFinite",
             Self::NumberRange { .. } => "NumberRange",
             Self::NoTriangles => "NoTriangles",
+            Self::NoMemory { .. } => "LimitExceeded",
         }
     }
 
@@ -130,6 +137,7 @@ impl StlError {
                 "the program that wrote the file computed nonsense there; repair it at the source"
             }
             Self::NoTriangles => "check what was selected for export",
+            Self::NoMemory { .. } => "export the model with fewer facets",
         };
         Some(text.to_owned())
     }
