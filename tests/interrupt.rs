@@ -51,7 +51,8 @@ fn a_terminated_run_leaves_nothing_behind() {
     stops_on("TERM");
 }
 
-/// Whoever forgot to pipe a model in presses Ctrl-C.
+/// Whoever forgot to pipe a model in presses Ctrl-C. Here the signal is TERM: a shell that runs these tests in
+/// its background has told them to ignore INT, and what they start with them.
 #[test]
 fn a_run_that_waits_for_a_pipe_can_be_stopped() {
     for command in ["slice", "convert"] {

@@ -1,7 +1,7 @@
 //! As much material as the part holds, in outlines that close.
 
 use crate::program::{Motion, beads, motions, stl_volume, walls};
-use crate::run::{model, sliced};
+use crate::run::{Scratch, model, sliced};
 
 /// Solid, without anything beside the part.
 const SOLID: [&str; 4] = ["--set", "fill_density=100%", "--set", "skirts=0"];
@@ -96,5 +96,27 @@ fn every_layer_of_a_convex_part_has_one_outer_wall() {
         assert_eq!(seen.len(), walls.len(), "{name}: a layer has two outer walls");
         assert_eq!(seen, (0..seen.len()).collect::<Vec<_>>(), "{name}: a layer has none");
         assert!(seen.len() >= layers - 2, "{name}: {} layers", seen.len());
+    }
+}
+
+/// Moved outwards a small triangle gains more at its corners than along its sides.
+#[test]
+fn outlines_moved_outwards_gain_at_their_corners() {
+    let scratch = Scratch::new();
+    let corners = ["0 0 0", "8 0 0", "4 7 0", "4 2.3 8"];
+    let facet = |at: [usize; 3]| {
+        let [a, b, c] = at.map(|k| corners[k]);
+        format!(
+            "facet normal 0 0 0\nouter loop\nvertex {a}\nvertex {b}\nvertex {c}\nendloop\nendfacet\n"
+        )
+    };
+    let facets: String = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]].map(facet).concat();
+    scratch.file("tetrahedron.stl", format!("solid t\n{facets}endsolid t\n"));
+    for by in ["0.3", "1", "2"] {
+        let grown = format!("xy_size_compensation_mm={by}");
+        let arguments = ["slice", "tetrahedron.stl", "-q", "-o", "x.gcode", "--orient", "keep"];
+        let ran =
+            scratch.run(&[&arguments[..], &["--set", &grown, "--set", "fill_density=1"]].concat());
+        assert!(matches!(ran.code, Some(0 | 1)), "{by}: {:?} {}", ran.code, ran.err);
     }
 }

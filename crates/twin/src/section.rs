@@ -13,6 +13,8 @@
 //! Layers come from below upwards, so a sweep over facets in slabs of height finds those of one
 //! plane in time proportional to what it cuts.
 
+use std::collections::HashMap;
+
 use mesh::mesh::Mesh;
 use nalgebra::{Point2, Point3, Vector2};
 
@@ -205,6 +207,26 @@ impl Section {
         self.pieces.iter().map(|p| (p.to - p.from).norm()).sum()
     }
 
+    /// Returns how far the outline turns at its convex corners, rad: 2π for each outline that is convex, more
+    /// for others. Moved outwards by `d` and rounded there, the section grows by `d` along its outline and by
+    /// `d²/2` for each radian (Steiner's formula; no less where it is notched).
+    #[must_use]
+    pub fn convex_turns(&self) -> f64 {
+        let direction = |piece: &Piece| {
+            let along = piece.to - piece.from;
+            (along.norm() > SHORTEST_PIECE).then_some(along)
+        };
+        let key = |p: &Point2<f64>| [p.x, p.y].map(|c| (c / SHORTEST_PIECE).round() as i64);
+        let ways = || self.pieces.iter().filter_map(|p| Some((p, direction(p)?)));
+        let leaving: HashMap<[i64; 2], Vector2<f64>> =
+            ways().map(|(piece, along)| (key(&piece.from), along)).collect();
+        let turns = ways().filter_map(|(piece, along)| {
+            let next = leaving.get(&key(&piece.to))?;
+            Some(along.perp(next).atan2(along.dot(next)).max(0.0))
+        });
+        turns.sum()
+    }
+
     /// Returns how often the outline winds round each of `points`, in their order.
     #[must_use]
     pub fn windings(&self, points: &[Point2<f64>]) -> Vec<i32> {
@@ -247,6 +269,9 @@ const ROWS_TO_MEASURE: usize = 1024;
 
 /// Most crossings of rows and pieces, which bounds the memory: fewer rows for huge outlines.
 const MOST_CROSSINGS: usize = 4_000_000;
+
+/// Pieces shorter than this are where a corner of the mesh lies in the plane, mm.
+const SHORTEST_PIECE: f64 = 1e-6;
 
 /// Share of the area that rounding alone may miscount.
 const NEGLIGIBLE: f64 = 1e-9;
@@ -319,6 +344,8 @@ fn crossing(low: &Point3<f64>, high: &Point3<f64>, z: f64) -> Point2<f64> {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
 
     /// A box around the z axis shifted by `x`, with a square hole through it when `hole` > 0;
@@ -361,6 +388,8 @@ pub(crate) mod tests {
         let section = cut(&block(10.0, 4.0, 8.0, 3.0), 2.5);
         assert!((section.area() - (400.0 - 64.0)).abs() < 1e-12);
         assert!((section.perimeter() - (80.0 + 32.0)).abs() < 1e-12);
+        // The corners of the hole are none where material grows.
+        assert!((section.convex_turns() - TAU).abs() < 1e-9);
         assert!(cut(&block(10.0, 0.0, 8.0, 0.0), 9.0).pieces.is_empty());
         assert!((volume(&block(10.0, 0.0, 8.0, 50.0)) - 3200.0).abs() < 1e-9);
     }

@@ -92,6 +92,7 @@ mod tests {
             other: 0.0,
             area: None,
             outline: 0.0,
+            corners: 0.0,
             is_plane: true,
         };
         (0..count).map(layer).collect()

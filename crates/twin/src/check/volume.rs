@@ -3,7 +3,7 @@
 //! What a layer holds is the area of the mesh's section at the middle of the layer times its
 //! height; what is laid is filament times its cross-section. Skirt, brim, priming
 //! (`Custom`), supports and ironing are not the part's. Outlines that are moved on purpose count
-//! as a wider border.
+//! as a wider border, with its rounded corners.
 //!
 //! * A layer may hold more than its section by [`LAYER_SHARE`] of it, plus [`BORDER`] times its
 //!   outline, plus one bead's dot.
@@ -72,6 +72,8 @@ pub struct LayerVolume {
     pub area: Option<f64>,
     /// The length of the outline there, mm; zero without a mesh.
     pub outline: f64,
+    /// What the section gains at corners where outlines are moved on purpose, mm².
+    pub corners: f64,
     /// Whether the nozzle stayed in one plane while it laid the part.
     pub is_plane: bool,
 }
@@ -83,6 +85,8 @@ pub(crate) struct Volume {
     nozzle: f64,
     /// How far outlines may lie from those of the mesh, mm.
     border: f64,
+    /// How far they were moved on purpose, mm.
+    moved: f64,
     layers: Vec<LayerVolume>,
     /// Families of layers that were announced, the first [`MOST_FAMILIES`].
     families: Vec<Family>,
@@ -100,6 +104,7 @@ impl Volume {
             filament_area,
             nozzle,
             border: BORDER,
+            moved: 0.0,
             layers: Vec::new(),
             families: Vec::new(),
             by_role,
@@ -110,7 +115,7 @@ impl Volume {
     /// Allows for outlines that are moved by as much on purpose, mm.
     #[must_use]
     pub(crate) fn moved(self, by: f64) -> Self {
-        Self { border: BORDER + by, ..self }
+        Self { border: BORDER + by, moved: by, ..self }
     }
 
     pub(crate) fn segment(&mut self, segment: &Segment) {
@@ -164,6 +169,9 @@ impl Volume {
             other: 0.0,
             area: section.map(Section::area),
             outline: section.map_or(0.0, Section::perimeter),
+            corners: section
+                .filter(|_| self.moved > 0.0)
+                .map_or(0.0, |section| section.convex_turns() * self.moved * self.moved / 2.0),
             is_plane: true,
         });
     }
@@ -298,7 +306,8 @@ impl Bill {
     /// `None` where a plane section says nothing.
     fn of(layer: &LayerVolume, border: f64) -> Option<Self> {
         let (height, area) = (layer.height?, layer.area?);
-        let borders = Self::for_outline(layer.outline, height, border);
+        let mut borders = Self::for_outline(layer.outline, height, border);
+        borders.border += layer.corners * height;
         layer.is_plane.then_some(Self { section: area * height, ..borders })
     }
 

@@ -307,6 +307,7 @@ mod tests {
             other: 0.0,
             area: None,
             outline: 0.0,
+            corners: 0.0,
             is_plane: true,
         };
         let layers: Vec<_> = (0..10).map(layer).collect();
