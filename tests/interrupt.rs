@@ -62,7 +62,7 @@ fn a_run_that_waits_for_a_pipe_can_be_stopped() {
         // Time to begin with reading.
         std::thread::sleep(Duration::from_millis(500));
         let sent =
-            Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status().unwrap();
+            Command::new("kill").args(["-s", "TERM", &child.id().to_string()]).status().unwrap();
         assert!(sent.success());
         let asked = Instant::now();
         while child.try_wait().unwrap().is_none() {

@@ -11,7 +11,7 @@ use machine::profile::Printer;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, shown};
 use crate::report::Warning;
 
 /// A calibration file.
@@ -168,8 +168,9 @@ impl Calibration {
             return Err(Failure::new(
                 "ConfigRange",
                 format!(
-                    "{name}: head.pivot_length_mm = {length} is out of range; it is from \
-                     {LEAST_PIVOT_MM} to {GREATEST_PIVOT_MM}"
+                    "{name}: head.pivot_length_mm = {} is out of range; it is from \
+                     {LEAST_PIVOT_MM} to {GREATEST_PIVOT_MM}",
+                    shown(length)
                 ),
             ));
         }
@@ -195,7 +196,10 @@ impl Calibration {
             if !in_range {
                 let failure = Failure::new(
                     "ConfigRange",
-                    format!("{name}: {key} = {value} is out of range; it is within {most}"),
+                    format!(
+                        "{name}: {key} = {} is out of range; it is within {most}",
+                        shown(value)
+                    ),
                 );
                 return Err(if key == "rail.b_mm" {
                     failure.hint("shim the rail so that it passes the axis, then calibrate again")

@@ -77,7 +77,7 @@ impl Failure {
             name if name == "-" => "standard input".into(),
             name => name,
         };
-        if !self.message.contains(&*name) {
+        if !names(&self.message, &name) {
             // The end of a long path tells more than its begin, and the message must have room.
             let skipped = name.chars().count().saturating_sub(LONGEST_NAME);
             let end: String = name.chars().skip(skipped).collect();
@@ -168,6 +168,21 @@ fn on_one_line(text: &str) -> String {
     line
 }
 
+/// Whether a message names a file, and not only a word that holds its name.
+fn names(message: &str, file: &str) -> bool {
+    let is_apart = |letter: Option<char>| letter.is_none_or(|l| !l.is_alphanumeric());
+    message.match_indices(file).any(|(at, _)| {
+        is_apart(message[..at].chars().next_back())
+            && is_apart(message[at + file.len()..].chars().next())
+    })
+}
+
+/// A number that a user gave, as short as it can be said: 1e300 has 301 digits.
+#[must_use]
+pub(crate) fn shown(number: f64) -> String {
+    format!("{number:?}").trim_end_matches(".0").to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -185,6 +200,8 @@ mod tests {
         let named = Failure::new("NoVolume", "no inside").about(long.as_ref()).to_string();
         assert!(named.ends_with("x/cube.stl: no inside") && named.len() < 300, "{named}");
         assert_eq!(failure.clone().about("part".as_ref()), failure, "it is named already");
+        assert_ne!(failure.clone().about("a".as_ref()), failure, "a word is no name of a file");
+        assert_eq!([0.2, 10.0, 1e300].map(shown), ["0.2", "10", "1e300"]);
         let json: serde_json::Value = serde_json::from_str(&failure.to_json()).unwrap();
         assert_eq!(json["error"]["exit"], 5);
     }

@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::key::{Key, Kind, Section, Value};
 use super::ranges;
-use crate::failure::Failure;
+use crate::failure::{Failure, shown};
 
 /// What a file says.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -196,7 +196,12 @@ fn in_count_range(key: &'static Key, count: i64, place: &str) -> Result<Value, F
 fn out_of_range(key: &Key, number: f64, place: &str) -> Failure {
     Failure::new(
         "ConfigRange",
-        format!("{place}: {} = {number} is out of range; it is {}", key.name, key.kind.wanted()),
+        format!(
+            "{place}: {} = {} is out of range; it is {}",
+            key.name,
+            shown(number),
+            key.kind.wanted()
+        ),
     )
 }
 
