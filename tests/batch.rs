@@ -52,6 +52,9 @@ fn a_failing_model_does_not_stop_the_rest_and_nothing_is_done_twice() {
     let ran = batch(&scratch, &[]).expect(5);
     assert!(ran.out.starts_with("3 done, 2 failed"), "{}", ran.out);
     assert!(ran.out.contains("c.stl: error[") && ran.out.contains("huge.stl: error["));
+    for line in ran.out.lines().filter(|line| line.contains("error[")) {
+        assert_eq!(line.matches(".stl").count(), 1, "a model is named once: {line}");
+    }
     assert_eq!(programs(&scratch), ["a.gcode", "b.gcode", "e ü.gcode"]);
     let first = report(&scratch, "batch.json");
     let status: Vec<u64> =

@@ -2,6 +2,7 @@
 
 #![cfg(unix)]
 
+use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -19,13 +20,28 @@ fn long_run(scratch: &Scratch) -> Child {
     arguments.extend(fine.iter().flat_map(|pair| ["--set", pair]));
     let child =
         scratch.rhumb(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let is_writing = |name: &String| {
-        name.ends_with(".tmp")
-            && name.contains("cube.gcode")
-            && scratch.path(name).metadata().is_ok_and(|file| file.len() > 0)
-    };
-    wait_until("the run writes", || scratch.names().iter().any(is_writing));
+    wait_until("the run writes", || is_writing(scratch, &child));
     child
+}
+
+/// Whether a run has written some of a program: into a file with a name of its own, or, on Linux, without.
+fn is_writing(scratch: &Scratch, run: &Child) -> bool {
+    let folder = scratch.path("").canonicalize().unwrap();
+    let has_begun = |path: PathBuf| path.metadata().is_ok_and(|file| file.len() > 0);
+    let is_draft = |open: &PathBuf| {
+        let target = std::fs::read_link(open).unwrap_or_default();
+        target.starts_with(&folder) && target.to_string_lossy().ends_with(" (deleted)")
+    };
+    let open = std::fs::read_dir(format!("/proc/{}/fd", run.id())).into_iter().flatten();
+    let mut drafts = open.flatten().map(|file| file.path()).filter(is_draft);
+    let is_named = |name: &String| name.ends_with(".tmp") && name.contains("cube.gcode");
+    drafts.any(has_begun)
+        || scratch
+            .names()
+            .iter()
+            .filter(|name| is_named(name))
+            .map(|n| scratch.path(n))
+            .any(has_begun)
 }
 
 fn stops_on(signal: &str) {

@@ -133,3 +133,15 @@ fn a_slow_carriage() {
     let set = ["--set", "rail_speed_mm_per_s=20", "--set", "rail_acceleration_mm_per_s2=150"];
     keeps(&sliced("cube", &set), &limits);
 }
+
+/// Far more than the axis needs: lines bend round it in moves as short as the curve asks for.
+#[test]
+fn a_wide_clearance_is_kept() {
+    let text = sliced("cube", &["--set", "axis_clearance_mm=10", "--set", "fill_density=0.1"]);
+    for motion in motions(&text).iter().filter(|motion| motion.lays()) {
+        let [from, middle, to] = [0.0, 0.5, 1.0].map(|share| motion.at(share));
+        let off = |k: usize| middle[k] - (from[k] + to[k]) / 2.0;
+        let bow = off(0).hypot(off(1));
+        assert!(bow <= 0.05, "line {}: bows by {bow} mm", motion.line);
+    }
+}

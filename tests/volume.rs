@@ -112,11 +112,13 @@ fn outlines_moved_outwards_gain_at_their_corners() {
     };
     let facets: String = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]].map(facet).concat();
     scratch.file("tetrahedron.stl", format!("solid t\n{facets}endsolid t\n"));
-    for by in ["0.3", "1", "2"] {
+    let plain = ["slice", "tetrahedron.stl", "-q", "-o", "x.gcode", "--orient", "keep"];
+    for (by, layers) in
+        [("0.3", "planar"), ("1", "planar"), ("2", "planar"), ("2", "conical"), ("2", "caps")]
+    {
         let grown = format!("xy_size_compensation_mm={by}");
-        let arguments = ["slice", "tetrahedron.stl", "-q", "-o", "x.gcode", "--orient", "keep"];
-        let ran =
-            scratch.run(&[&arguments[..], &["--set", &grown, "--set", "fill_density=1"]].concat());
-        assert!(matches!(ran.code, Some(0 | 1)), "{by}: {:?} {}", ran.code, ran.err);
+        let more = ["--set", &grown, "--set", "fill_density=1", "--layers", layers];
+        let ran = scratch.run(&[&plain[..], &more].concat());
+        assert!(matches!(ran.code, Some(0 | 1)), "{by} {layers}: {:?} {}", ran.code, ran.err);
     }
 }

@@ -100,27 +100,22 @@ pub fn self_intersections(solid: &Solid, limit: usize) -> Vec<SelfIntersection> 
     let mesh = solid.mesh();
     let depth = depth_mm(&mesh.bounds());
     let n = mesh.triangles.len() as u32;
-    let facets: Vec<Facet> = (0..n).map(|t| Facet::new(mesh.corners(t))).collect();
-    let boxes: Vec<Bounds> = (0..n).map(|t| Bounds::of(&mesh.corners(t))).collect();
-    let tree = BoxTree::new(boxes.clone());
+    let bounds = |t: u32| Bounds::of(&mesh.corners(t));
+    let tree = BoxTree::new((0..n).map(bounds).collect());
     let are_neighbours = |t: u32, u: u32| {
         let (of_t, of_u) = (&mesh.triangles[t as usize], &mesh.triangles[u as usize]);
         of_u.iter().filter(|v| of_t.contains(v)).count() >= 2
     };
     let with_later = |t: u32| -> (usize, Vec<SelfIntersection>) {
-        let mut found = Vec::new();
-        let near = tree.meeting(&boxes[t as usize]);
+        let near = tree.meeting(&bounds(t));
         let n_pairs = near.len();
-        for u in near {
-            if u <= t {
-                continue;
-            }
-            let crossing = facets[t as usize].crossing(&facets[u as usize], depth);
-            if let Some(at) = crossing.filter(|_| !are_neighbours(t, u)) {
-                found.push(SelfIntersection { triangles: [t, u], at });
-            }
-        }
-        (n_pairs, found)
+        let facet = Facet::new(mesh.corners(t));
+        let others = near.into_iter().filter(|u| *u > t && !are_neighbours(t, *u));
+        let crossing = |u: u32| {
+            let at = facet.crossing(&Facet::new(mesh.corners(u)), depth)?;
+            Some(SelfIntersection { triangles: [t, u], at })
+        };
+        (n_pairs, others.filter_map(crossing).collect::<Vec<_>>())
     };
     // In rows, so that a mesh full of crossings stops early.
     const ROW: u32 = 1 << 12;

@@ -40,6 +40,7 @@ pub mod choice;
 pub mod clock;
 pub mod commands;
 pub mod convert;
+mod draft;
 pub mod estimate;
 pub mod failure;
 mod filling;

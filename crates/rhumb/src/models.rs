@@ -86,7 +86,7 @@ pub fn read(model: &Model<'_>, wish: &Wish) -> Result<Given, Failure> {
 }
 
 /// Memory that no mesh of so many facets does with less than, beside the facets, bytes for each.
-const LEAST_ROOM: usize = 48;
+const LEAST_ROOM: usize = 72;
 
 /// Sees that there is memory to make a mesh of so many facets: where it ends later, the process ends with it
 /// and says nothing that a user understands.

@@ -1,23 +1,21 @@
 //! Files that go out: whole or not at all.
 //!
-//! What is written goes to a file of its own beside the target and takes the target's place only
+//! What is written goes to a [draft](crate::draft) beside the target and takes the target's place only
 //! when it is complete and checked. Whatever stops rhumb before, the target keeps its old content
 //! and nothing is left behind. Devices and standard output are written at the very end.
 
-use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
+use crate::draft::Draft;
 use crate::failure::Failure;
 
-/// A file in the making.
+/// An output under way.
 #[derive(Debug)]
 pub struct Output {
     destination: Destination,
-    temporary: PathBuf,
-    file: File,
-    is_done: bool,
+    draft: Draft,
 }
 
 #[derive(Debug)]
@@ -49,14 +47,13 @@ impl Output {
             },
             _ => std::env::temp_dir(),
         };
-        let (temporary, file) =
-            temporary_in(&folder, target).map_err(|error| denied(target, &error))?;
-        Ok(Self { destination, temporary, file, is_done: false })
+        let draft = Draft::create(&folder, target).map_err(|error| denied(target, &error))?;
+        Ok(Self { destination, draft })
     }
 
     /// The file to write to.
     pub fn file(&mut self) -> &mut File {
-        &mut self.file
+        self.draft.file()
     }
 
     /// Opens what was written for reading it again.
@@ -65,7 +62,10 @@ impl Output {
     ///
     /// `OutputDenied`, when the file cannot be read.
     pub fn reread(&self) -> Result<File, Failure> {
-        File::open(&self.temporary).map_err(|error| denied(&self.temporary, &error))
+        self.draft.reread().map_err(|error| match &self.destination {
+            Destination::StandardOutput => denied(Path::new("standard output"), &error),
+            Destination::InPlace(path) | Destination::File(path) => denied(path, &error),
+        })
     }
 
     /// Puts what was written in its place.
@@ -74,37 +74,21 @@ impl Output {
     ///
     /// `OutputFull` or `OutputDenied`; the target is then as it was.
     pub fn commit(mut self) -> Result<(), Failure> {
-        match &self.destination {
+        match self.destination {
             Destination::StandardOutput => {
                 let mut out = io::stdout().lock();
-                copy(&mut self.file, &mut out, Path::new("standard output"))?;
+                copy(self.draft.file(), &mut out, Path::new("standard output"))
             }
             Destination::InPlace(path) => {
                 let mut device = OpenOptions::new()
                     .write(true)
-                    .open(path)
-                    .map_err(|error| denied(path, &error))?;
-                copy(&mut self.file, &mut device, path)?;
+                    .open(&path)
+                    .map_err(|error| denied(&path, &error))?;
+                copy(self.draft.file(), &mut device, &path)
             }
             Destination::File(path) => {
-                self.file.sync_all().map_err(|error| failed(path, &error))?;
-                if let Ok(old) = fs::metadata(path) {
-                    // A mode that cannot be kept is no reason to lose the result.
-                    let _ = fs::set_permissions(&self.temporary, old.permissions());
-                }
-                fs::rename(&self.temporary, path).map_err(|error| failed(path, &error))?;
-                self.is_done = true;
+                self.draft.replace(&path).map_err(|error| failed(&path, &error))
             }
-        }
-        Ok(())
-    }
-}
-
-impl Drop for Output {
-    fn drop(&mut self) {
-        if !self.is_done {
-            // Nothing more can be done about a file that does not go.
-            let _ = fs::remove_file(&self.temporary);
         }
     }
 }
@@ -239,22 +223,4 @@ fn is_same_file(input: &Path, _: &fs::Metadata, target: &Path) -> bool {
         (Ok(a), Ok(b)) => a == b,
         _ => false,
     }
-}
-
-/// A new file with a name that no other run uses.
-fn temporary_in(folder: &Path, target: &Path) -> io::Result<(PathBuf, File)> {
-    let stem = target.file_name().unwrap_or_default();
-    for attempt in 0..1000_u32 {
-        let mut name = OsString::from(".");
-        // Long names are cut by the system; the number alone tells runs apart.
-        name.push(if stem.len() <= 200 { stem } else { "long".as_ref() });
-        name.push(format!(".{}-{attempt}.tmp", std::process::id()));
-        let path = folder.join(name);
-        match OpenOptions::new().read(true).write(true).create_new(true).open(&path) {
-            Ok(file) => return Ok((path, file)),
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Err(io::Error::new(io::ErrorKind::AlreadyExists, "no free temporary name"))
 }

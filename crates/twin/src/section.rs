@@ -314,6 +314,40 @@ pub fn surface(mesh: &Mesh) -> f64 {
     0.5 * twice.sum::<f64>()
 }
 
+/// Returns what a body gains at its convex edges, over that on its surface, for each mm² that all of its outside
+/// moves outwards: half of the sum of their lengths times their outer angles, mm (Steiner's formula,
+/// `V + S·d + M·d² + 4π/3·d³`).
+#[must_use]
+pub fn convex_edges(mesh: &Mesh) -> f64 {
+    // Each side by its ends, with the facet and how it runs along it.
+    let mut sides = Vec::with_capacity(3 * mesh.triangles.len());
+    for (facet, corners) in (0_u32..).zip(&mesh.triangles) {
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            sides.push((a.min(b), a.max(b), a > b, facet));
+        }
+    }
+    sides.sort_unstable();
+    let normal = |facet: u32| {
+        let [a, b, c] = corners_of(mesh, mesh.triangles.get(facet as usize)?)?;
+        (b - a).cross(&(c - a)).try_normalize(0.0)
+    };
+    let turn = |pair: &[(u32, u32, bool, u32)]| {
+        let [(low, high, false, left), (other_low, other_high, true, right)] = *pair else {
+            return None;
+        };
+        let (from, to) = (mesh.vertices.get(low as usize)?, mesh.vertices.get(high as usize)?);
+        if (low, high) != (other_low, other_high) {
+            return None;
+        }
+        let (along, left, right) = (to - from, normal(left)?, normal(right)?);
+        let across = left.cross(&right);
+        let angle = across.norm().atan2(left.dot(&right));
+        (across.dot(&along) > 0.0).then(|| along.norm() * angle)
+    };
+    0.5 * sides.windows(2).filter_map(turn).sum::<f64>()
+}
+
 /// The corners of a facet; `None` when it names no vertex or is not finite.
 fn corners_of(mesh: &Mesh, corners: &[u32; 3]) -> Option<[Point3<f64>; 3]> {
     let corner = |k: usize| mesh.vertices.get(corners[k] as usize).copied();
@@ -392,6 +426,9 @@ pub(crate) mod tests {
         assert!((section.convex_turns() - TAU).abs() < 1e-9);
         assert!(cut(&block(10.0, 0.0, 8.0, 0.0), 9.0).pieces.is_empty());
         assert!((volume(&block(10.0, 0.0, 8.0, 50.0)) - 3200.0).abs() < 1e-9);
+        // Twelve edges of a quarter turn each; all of a box is convex.
+        let edges = std::f64::consts::FRAC_PI_4 * 4.0 * (20.0 + 20.0 + 8.0);
+        assert!((convex_edges(&block(10.0, 0.0, 8.0, 50.0)) - edges).abs() < 1e-9);
     }
 
     #[test]

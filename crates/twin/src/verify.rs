@@ -49,7 +49,7 @@ use crate::finding::{Finding, Findings, Omitted, Place, Severity, exceeds};
 use crate::ramps::Ramps;
 use crate::replay::{Event, Heating, LayerMark, Replay, read};
 use crate::rounding::Doubt;
-use crate::section::{Section, Sweep, surface, volume};
+use crate::section::{Section, Sweep, convex_edges, surface, volume};
 use crate::segment::Segment;
 use crate::thorough::Watch;
 use crate::totals::{Tally, Totals};
@@ -233,11 +233,13 @@ impl<'a> Verifier<'a> {
         self.heat.end(place, &mut self.findings);
         self.declared.end(&mut self.findings);
         self.flow.end(place, &mut self.findings);
-        let enclosed = self
-            .setup
-            .mesh
-            .map(|mesh| |families: &[Family], thickness: f64| enclosed(mesh, families, thickness));
-        let mesh = self.setup.mesh;
+        let Setup { mesh, moved, .. } = self.setup;
+        let enclosed = mesh.map(|mesh| {
+            move |families: &[Family], thickness: f64| Enclosed {
+                edges: if moved == 0.0 { 0.0 } else { convex_edges(mesh) },
+                ..enclosed(mesh, families, thickness)
+            }
+        });
         let is_open = || mesh.is_some_and(has_holes);
         let unjudged = self.volume.end(enclosed, is_open, self.setup.solid, &mut self.findings);
         let mut notes: Vec<&'static str> = unjudged.into_iter().collect();
@@ -480,7 +482,7 @@ impl<'a> Verifier<'a> {
         }
     }
 }
-/// What a mesh holds, for layers of some families and this thickness, mm.
+/// What a mesh holds, for layers of some families and this thickness, mm; without its edges.
 ///
 /// A ball of radius R leaves the layer that touches it by one thickness t where it leans by √(2t/R);
 /// what leans more is met by so many layers that their errors cancel. R is that of the ball with this
@@ -498,7 +500,7 @@ fn enclosed(mesh: &Mesh, families: &[Family], thickness: f64) -> Enclosed {
         let share = (reach / (least * least)).min(1.0);
         share.is_finite().then_some(share * area.norm())
     });
-    Enclosed { volume: volume(mesh), surface, along: along.sum() }
+    Enclosed { volume: volume(mesh), surface, edges: 0.0, along: along.sum() }
 }
 
 /// Whether some side of a facet has no other; a mesh that is none has no sides to ask for.

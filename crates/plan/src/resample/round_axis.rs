@@ -17,6 +17,10 @@ const ARC_STEP: f64 = std::f64::consts::FRAC_PI_6;
 /// keep clear too: the ends lie 0.5 % farther out.
 const ARC_CHORD: f64 = std::f64::consts::PI / 16.0;
 
+/// How far an arc may bow from the straight line between the ends of a move, mm: where the clearance is wide,
+/// moves are shorter.
+const ARC_BOW_MM: f64 = 0.04;
+
 /// How far rounding may bring two words from their place near the axis, mm: half a last place each, and
 /// both ends of a move.
 const NEAR_AXIS_ROUNDING_MM: f64 = 2e-5;
@@ -127,6 +131,7 @@ impl Resampler {
             Space::IdealPlane => ARC_CHORD,
             Space::Joints | Space::Part => ARC_STEP,
         };
+        let step = step.min(2.0 * (1.0 - ARC_BOW_MM / start.norm()).max(-1.0).acos());
         let pieces = (sweep.abs() / step).ceil().max(1.0) as u32;
         for k in 1..=pieces {
             let share = f64::from(k) / f64::from(pieces);

@@ -289,7 +289,12 @@ impl Work<'_> {
 /// A model in one line.
 fn line(record: &Record) -> String {
     let how = match (&record.error, record.time_s) {
-        (Some(error), _) => format!("error[{}]: {}", error.class, error.message),
+        (Some(error), _) => {
+            // The model is named in front of the line already.
+            let named = format!("{}: ", record.model);
+            let message = error.message.strip_prefix(&named).unwrap_or(&error.message);
+            format!("error[{}]: {message}", error.class)
+        }
         (None, Some(time)) => {
             let grams = record.filament_g.unwrap_or_default();
             let look = if record.status == DONE { "" } else { ", needs a look" };

@@ -23,7 +23,7 @@
 //!
 //! mm, mm², mm³. Part frame.
 
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_3, FRAC_PI_4};
 
 use machine::program::Role;
 
@@ -277,7 +277,10 @@ impl Volume {
         let edges = enclosed.surface * height * (1.0 - FRAC_PI_4) / 2.0;
         // A layer that ends in a surface is laid whole or not at all.
         let stairs = enclosed.along * height / 2.0;
-        Bill { section: enclosed.volume, border: enclosed.surface * self.border + stairs, edges }
+        let moved = self.moved;
+        let corners = moved * moved * (enclosed.edges + 4.0 * FRAC_PI_3 * moved);
+        let border = enclosed.surface * self.border + corners + stairs;
+        Bill { section: enclosed.volume, border, edges }
     }
 }
 
@@ -288,6 +291,8 @@ pub(crate) struct Enclosed {
     pub(crate) volume: f64,
     /// Area of its surface, mm².
     pub(crate) surface: f64,
+    /// What it gains at its edges where outlines are moved on purpose, mm³ for each mm² of that.
+    pub(crate) edges: f64,
     /// Area of what runs along the layers, mm². What leans against them counts by the share of it
     /// that one layer meets.
     pub(crate) along: f64,
@@ -409,7 +414,7 @@ mod tests {
             check.segment(&line);
         }
         let mut findings = Findings::default();
-        let enclosed = Enclosed { volume: 400.0, surface: 880.0, along: 0.0 };
+        let enclosed = Enclosed { volume: 400.0, surface: 880.0, edges: 0.0, along: 0.0 };
         let enclosed = Some(|_: &[Family], _| enclosed);
         let unjudged = check.end(enclosed, || is_open, is_solid, &mut findings);
         (findings.kept().iter().map(|finding| finding.line).collect(), unjudged)
@@ -473,7 +478,7 @@ mod tests {
                 .unwrap()
                 .contains("without a mesh")
         );
-        let small = Enclosed { volume: 1.0, surface: 6.0, along: 0.0 };
+        let small = Enclosed { volume: 1.0, surface: 6.0, edges: 0.0, along: 0.0 };
         assert!(
             check
                 .end(Some(|_: &[Family], _| small), || false, true, &mut findings)
@@ -496,6 +501,7 @@ mod tests {
         let mesh = Enclosed {
             volume: section::volume(&block),
             surface: section::surface(&block),
+            edges: 0.0,
             along: 0.0,
         };
         assert_eq!(mesh.surface, 880.0);

@@ -91,7 +91,7 @@ pub(super) const KEYS: &[Key] = &[
         Printer,
         "bed_speed_deg_per_s",
         "bed_speed",
-        (360.0, 0.1, 100_000.0),
+        (360.0, 1.0, 100_000.0),
         "greatest turning speed of the bed",
     ),
     number(
