@@ -40,6 +40,8 @@ fn values_that_make_no_sense_are_refused_by_class() {
         ("fill_density=150%", "ConfigRange"),
         ("dialect=klingon", "ConfigRange"),
         ("rail_min_mm=200", "ConfigConflict"),
+        // Round the axis at 0.02 mm this is 0.02 mm/min, and the last place of F is 0.1.
+        ("bed_speed_deg_per_s=1", "ConfigConflict"),
         ("start_gcode=M109 S{no_such_name}", "ConfigUnknownKey"),
     ] {
         let ran = scratch.run(&["slice", "cube.stl", "--set", set]).refused(class, 6);

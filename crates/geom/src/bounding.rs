@@ -63,6 +63,12 @@ impl Bounds {
         self.size().norm()
     }
 
+    /// Returns whether the boxes meet or touch.
+    #[must_use]
+    pub fn meets(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.min[k] <= other.max[k] && other.min[k] <= self.max[k])
+    }
+
     fn to_parry(self) -> Aabb {
         let vector = |p: Point3<f64>| Vector::new(p.x, p.y, p.z);
         Aabb::new(vector(self.min), vector(self.max))
@@ -119,7 +125,7 @@ impl BoxTree {
         };
         let leaves = self.tree.intersect_aabb(&query_box);
         let near = leaves.flat_map(|i| leaf(i).iter().copied());
-        let mut found: Vec<u32> = near.filter(|&i| meet(&self.boxes[i as usize], query)).collect();
+        let mut found: Vec<u32> = near.filter(|&i| self.boxes[i as usize].meets(query)).collect();
         found.sort_unstable();
         found
     }
@@ -160,10 +166,6 @@ fn spread(bits: u64) -> u64 {
         .fold(bits, |bits, (by, mask)| (bits | bits << by) & mask)
 }
 
-fn meet(a: &Bounds, b: &Bounds) -> bool {
-    (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -186,7 +188,7 @@ mod tests {
         let mut expected = Vec::new();
         for i in 0..300_u32 {
             for j in i + 1..300 {
-                if meet(&boxes[i as usize], &boxes[j as usize]) {
+                if boxes[i as usize].meets(&boxes[j as usize]) {
                     expected.push((i, j));
                 }
             }

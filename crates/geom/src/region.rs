@@ -14,7 +14,7 @@ use i_overlay::core::overlay_rule::OverlayRule;
 use nalgebra::Point2;
 
 use crate::boolean::{self, Side};
-use crate::grid::{GridPoint, STEPS_PER_MM, mm, snap, steps};
+use crate::grid::{GridPoint, STEPS_PER_MM, mm, snap};
 use crate::simplify::simplify_ring;
 
 /// One closed ring; the last point is joined to the first.
@@ -202,18 +202,14 @@ impl Region {
         Self { islands: islands.collect() }
     }
 
-    /// Returns the islands whose boxes come within `reach` (mm) of a box.
+    /// Returns the islands of these numbers, in their order.
+    ///
+    /// # Panics
+    ///
+    /// When there is no island of a number.
     #[must_use]
-    pub fn near(&self, around: &GridBounds, reach: f64) -> Self {
-        let reach = steps(reach);
-        self.filtered(|island| {
-            let Some(bounds) = bounds_of(island.iter().take(1).flatten()) else { return false };
-            let apart = |low: i32, high: i32| i64::from(low) - i64::from(high) > i64::from(reach);
-            !(apart(bounds.min.x, around.max.x)
-                || apart(around.min.x, bounds.max.x)
-                || apart(bounds.min.y, around.max.y)
-                || apart(around.min.y, bounds.max.y))
-        })
+    pub fn selected(&self, numbers: &[u32]) -> Self {
+        Self { islands: numbers.iter().map(|&k| self.islands[k as usize].clone()).collect() }
     }
 
     /// Returns the islands that `keep` accepts.

@@ -1,7 +1,11 @@
 //! Triangles that fill a set of closed rings: constrained Delaunay triangulation.
 //!
 //! Wraps the triangulation of the spade crate, the only module that names it. What lies inside is
-//! decided by the even-odd rule, so rings may come in any direction and any nesting.
+//! decided by the even-odd rule, so rings may come in any direction and any nesting. The ribbon between two
+//! rings, which is what thin walls leave, is triangulated along its way, which is several times faster
+//! ([`ribbon`]).
+
+mod ribbon;
 
 use nalgebra::Point2;
 use spade::{ConstrainedDelaunayTriangulation, Triangulation as _};
@@ -46,6 +50,11 @@ type Cdt = ConstrainedDelaunayTriangulation<spade::Point2<f64>>;
 ///
 /// [`TriangulateError`], when sides cross or coordinates are out of range.
 pub fn triangulate(rings: &[Vec<Point2<f64>>]) -> Result<Triangulation, TriangulateError> {
+    if let [outer, hole] = rings
+        && let Some(triangles) = ribbon::triangulate(outer, hole)
+    {
+        return Ok(triangles);
+    }
     let points: Vec<Point2<f64>> = rings.iter().flatten().copied().collect();
     let first_same = first_of_equal_points(&points);
     // The triangulation wants each point once; `distinct` are the input indices that it gets.

@@ -73,14 +73,9 @@ pub fn order(
     for (path, reversed) in tour(&supports, ordering.nozzle) {
         ordering.fill(path, reversed);
     }
+    let boxes: Vec<PlaneBox> = layer.islands.iter().map(PlaneBox::around).collect();
     let mut left: Vec<usize> = (0..layer.islands.len()).collect();
-    while !left.is_empty() {
-        let (k, _) = left
-            .iter()
-            .map(|&island| distance_to_island(&layer.islands[island], &ordering.nozzle))
-            .enumerate()
-            .min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))
-            .expect("islands are left");
+    while let Some(k) = nearest_island(layer, &boxes, &left, &ordering.nozzle) {
         let index = left.remove(k);
         ordering.island = Some(index);
         if params.uphill {
@@ -92,13 +87,57 @@ pub fn order(
     ordering.lines
 }
 
-fn distance_to_island(island: &IslandPaths, from: &Point2<f64>) -> f64 {
+/// The place in `left` of the island that is nearest, the first of some that are equally near; `None` where
+/// none is left.
+fn nearest_island(
+    layer: &LayerPaths,
+    boxes: &[PlaneBox],
+    left: &[usize],
+    from: &Point2<f64>,
+) -> Option<usize> {
+    let mut nearest: Option<(usize, f64)> = None;
+    for (k, &island) in left.iter().enumerate() {
+        // Of thousands few are near enough to be looked at.
+        if nearest.is_some_and(|(_, least)| boxes[island].squared_distance(from) > least * least) {
+            continue;
+        }
+        let distance = distance_to_island(&layer.islands[island], from);
+        if nearest.is_none_or(|(_, least)| distance < least) {
+            nearest = Some((k, distance));
+        }
+    }
+    nearest.map(|(k, _)| k)
+}
+
+/// The stations of an island that are seen when the nearest is sought.
+fn places(island: &IslandPaths) -> impl Iterator<Item = Point2<f64>> {
     let external = island.walls.iter().filter_map(|group| group.loops.first());
-    external
-        .chain(island.all_fills())
-        .flat_map(|path| &path.stations)
-        .map(|station| distance(&station.at.xy(), from))
-        .fold(f64::INFINITY, f64::min)
+    let paths = external.chain(island.all_fills());
+    paths.flat_map(|path| &path.stations).map(|station| station.at.xy())
+}
+
+fn distance_to_island(island: &IslandPaths, from: &Point2<f64>) -> f64 {
+    places(island).map(|at| distance(&at, from)).fold(f64::INFINITY, f64::min)
+}
+
+/// The box around the places of an island, mm.
+struct PlaneBox {
+    min: Point2<f64>,
+    max: Point2<f64>,
+}
+
+impl PlaneBox {
+    fn around(island: &IslandPaths) -> Self {
+        let none = [f64::INFINITY, f64::NEG_INFINITY].map(|c| Point2::new(c, c));
+        let [min, max] = places(island).fold(none, |[min, max], p| [min.inf(&p), max.sup(&p)]);
+        Self { min, max }
+    }
+
+    /// The square of how far it is at least to any of them, mm²; infinite where there is none.
+    fn squared_distance(&self, from: &Point2<f64>) -> f64 {
+        let beyond = |k: usize| (self.min[k] - from[k]).max(from[k] - self.max[k]).max(0.0);
+        beyond(0).powi(2) + beyond(1).powi(2)
+    }
 }
 
 struct Ordering<'a> {

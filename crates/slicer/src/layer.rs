@@ -20,6 +20,7 @@ use crate::infill::ironing::ironing;
 use crate::infill::{FillLayer, FillLine, InfillParams, angle_in, fill, fill_bridge};
 use crate::level::Level;
 use crate::lift::Lift;
+use crate::nearby::Nearby;
 use crate::skins::{Neighbours, SKIN_TOLERANCE_MM, SkinParams, Skins, skins};
 use crate::support::{Column, SupportParams};
 use crate::thin::{AxisPoint, ThinParams, axes};
@@ -167,8 +168,9 @@ impl<'a> Parted<'a> {
         let level = &lift.level;
         let below = neighbours.below.first().copied().filter(|_| level.index > 0);
         let hanging = Below::new(material, below, &frame.chart, params.walls.external_width);
+        let around = Around::of(neighbours);
         let islands = material.islands().par_iter();
-        let islands = islands.map(|island| part(island, &hanging, neighbours, &frame, params));
+        let islands = islands.map(|island| part(island, &hanging, &around, &frame, params));
         Self {
             lift: *lift,
             islands: if is_vase { Vec::new() } else { islands.collect() },
@@ -307,11 +309,14 @@ fn floating(material: &Region, neighbours: &Neighbours<'_>, frame: &Frame<'_>) -
     if frame.lift.level.index == 0 {
         return Vec::new();
     }
-    let ground = neighbours.below.first().map(|below| Ground::of(below)).unwrap_or_default();
+    let ground = neighbours.below.first().map(|below| Nearby::of(below));
     let carried = neighbours.support.map(|column| &column.carried);
     let carried = carried.map(|seen| frame.chart.region_under(seen)).unwrap_or_default();
-    let column = Ground::of(&carried);
-    let floats = |island: &&Island| !ground.carries(island) && !column.carries(island);
+    let column = Nearby::of(&carried);
+    let floats = |island: &&Island| {
+        !ground.as_ref().is_some_and(|ground| is_carried(island, ground))
+            && !is_carried(island, &column)
+    };
     material.filtered(floats).islands().iter().map(|i| frame.floating(i)).collect()
 }
 
@@ -374,31 +379,15 @@ fn vase_layer(material: &Region, frame: &Frame<'_>, params: &PathParams) -> Fill
     Filled { paths, ..Filled::default() }
 }
 
-/// What a layer stands on: the islands of the layer below, each with the box around it, so that of
-/// thousands only those are looked at that can matter.
-#[derive(Default)]
-struct Ground<'a>(Vec<([GridPoint; 2], &'a Island)>);
-
-impl<'a> Ground<'a> {
-    fn of(below: &'a Region) -> Self {
-        let boxed = |island: &'a Island| Some((box_around(island)?, island));
-        Self(below.islands().iter().filter_map(boxed).collect())
-    }
-
-    /// Whether an island has anything below it.
-    fn carries(&self, island: &Island) -> bool {
-        let Some([low, high]) = box_around(island) else { return false };
-        let meets = |[a, b]: &[GridPoint; 2]| {
-            a.x <= high.x && low.x <= b.x && a.y <= high.y && low.y <= b.y
-        };
-        let outline = Region::from_island(island.clone());
-        self.0.iter().filter(|(around, _)| meets(around)).any(|(_, below)| {
-            // Nearly always a corner of one lies in the other.
-            has_corner_in(island, below)
-                || has_corner_in(below, island)
-                || !outline.intersection(&Region::from_island((*below).clone())).is_empty()
-        })
-    }
+/// Whether an island has anything of the layer below under it.
+fn is_carried(island: &Island, below: &Nearby<'_>) -> bool {
+    let outline = Region::from_island(island.clone());
+    below.meeting(island).into_iter().any(|below| {
+        // Nearly always a corner of one lies in the other.
+        has_corner_in(island, below)
+            || has_corner_in(below, island)
+            || !outline.intersection(&Region::from_island(below.clone())).is_empty()
+    })
 }
 
 /// Whether the first corner of an island lies in another.
@@ -407,48 +396,40 @@ fn has_corner_in(island: &Island, other: &Island) -> bool {
     corner.is_some_and(|corner| is_inside(other, &mm(*corner)))
 }
 
-/// The corners of the smallest box around an island.
-fn box_around(island: &Island) -> Option<[GridPoint; 2]> {
-    let outer = island.first()?;
-    let first = *outer.first()?;
-    let grown = |[low, high]: [GridPoint; 2], p: &GridPoint| {
-        let [mut low, mut high] = [low, high];
-        (low.x, low.y) = (low.x.min(p.x), low.y.min(p.y));
-        (high.x, high.y) = (high.x.max(p.x), high.y.max(p.y));
-        [low, high]
-    };
-    Some(outer.iter().fold([first; 2], grown))
-}
-
-/// What of the neighbours can matter to an island: bridges rest on what is near. Layers of few islands
-/// are taken whole; those of thousands would cost their square.
-fn near<'a>(outline: &Region, regions: &[&'a Region]) -> Vec<Cow<'a, Region>> {
-    let Some(bounds) = outline.bounds() else { return Vec::new() };
-    let part = |region: &&'a Region| match region.islands().len() {
-        0..=FEW_ISLANDS => Cow::Borrowed(*region),
-        _ => Cow::Owned(region.near(&bounds, NEAR_MM)),
-    };
-    regions.iter().map(part).collect()
-}
-
-/// How many islands a neighbouring layer may have without being looked through for those that are near.
-const FEW_ISLANDS: usize = 16;
-
 /// How far from its box an island looks, mm: many times further than beads and anchors of bridges reach.
 const NEAR_MM: f64 = 10.0;
+
+/// The neighbours of a layer, their islands by place: bridges rest on what is near.
+struct Around<'a> {
+    above: Vec<Nearby<'a>>,
+    below: Vec<Nearby<'a>>,
+    support: Option<&'a Column>,
+}
+
+impl<'a> Around<'a> {
+    fn of(neighbours: &Neighbours<'a>) -> Self {
+        let placed = |regions: &[&'a Region]| regions.iter().map(|r| Nearby::of(r)).collect();
+        let Neighbours { above, below, support } = neighbours;
+        Self { above: placed(above), below: placed(below), support: *support }
+    }
+}
+
+fn near<'a>(island: &Island, neighbours: &[Nearby<'a>]) -> Vec<Cow<'a, Region>> {
+    neighbours.iter().map(|region| region.around(island, NEAR_MM)).collect()
+}
 
 /// Takes an island apart.
 fn part(
     island: &Island,
     hanging: &Below,
-    neighbours: &Neighbours<'_>,
+    around: &Around<'_>,
     frame: &Frame<'_>,
     params: &PathParams,
 ) -> PartedIsland {
     let outline = Region::from_island(island.clone());
-    let [above, below] = [&neighbours.above, &neighbours.below].map(|all| near(&outline, all));
+    let [above, below] = [&around.above, &around.below].map(|all| near(island, all));
     let [above, below] = [&above, &below].map(|all| all.iter().map(AsRef::as_ref).collect());
-    let neighbours = &Neighbours { above, below, support: neighbours.support };
+    let neighbours = &Neighbours { above, below, support: around.support };
     let Frame { chart, thickness, .. } = *frame;
     let below = neighbours.below.first().copied().filter(|_| frame.lift.level.index > 0);
     let walls = suitable_walls(&outline, hanging, neighbours, frame, params);

@@ -24,6 +24,7 @@ pub mod infill;
 pub mod layer;
 pub mod level;
 pub mod lift;
+mod nearby;
 pub mod overhang;
 pub mod section;
 pub mod skins;

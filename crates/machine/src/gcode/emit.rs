@@ -25,6 +25,9 @@ const FILAMENT_DECIMALS: usize = 5;
 /// Decimal places of `F`.
 const FEED_DECIMALS: usize = 1;
 
+/// The least `F`, mm/min: one last place.
+pub const LEAST_FEED: f64 = 0.1;
+
 /// Decimal places of small inverse times: 0.0001/min is 0.1 % for a move of ten minutes.
 const INVERSE_TIME_DECIMALS: usize = 4;
 

@@ -11,6 +11,6 @@ pub mod posed;
 pub mod speed_word;
 
 pub use dialect::Dialect;
-pub use emit::{ELAPSED, Emitter, MOST_COLUMNS, printable};
+pub use emit::{ELAPSED, Emitter, LEAST_FEED, MOST_COLUMNS, printable};
 pub use number::decimal;
 pub use parse::{Code, Command, Line, SyntaxError, parse_line};

@@ -1,8 +1,8 @@
 //! The machine, from settings.
 
 use machine::drive::{Drive, Drives, Transmission};
-use machine::gcode::Dialect;
 use machine::gcode::dialect::Space;
+use machine::gcode::{Dialect, LEAST_FEED};
 use machine::height_map::HeightMap;
 use machine::kinematics::{Alignment, BedScale};
 use machine::profile::{Axis, NozzleShape, Printer, Turntable};
@@ -11,7 +11,7 @@ use machine::program::{BedTurn, Joints};
 use super::head;
 use super::lookup::Lookup;
 use super::resolve::conflict;
-use crate::failure::Failure;
+use crate::failure::{Failure, shown};
 
 pub(super) fn printer(get: &Lookup<'_>) -> Result<Printer, Failure> {
     Ok(Printer {
@@ -101,6 +101,7 @@ pub(super) fn suit(printer: &mut Printer, dialect: &Dialect) -> Result<(), Failu
         )
         .hint("use dialect = \"polar\" or \"rrf-direct\""));
     }
+    told_in_time(printer, dialect)?;
     if dialect.space != Space::IdealPlane {
         return Ok(());
     }
@@ -114,6 +115,26 @@ pub(super) fn suit(printer: &mut Printer, dialect: &Dialect) -> Result<(), Failu
     }
     Ok(())
 }
+
+/// Sees that the slowest move that the bed asks for, round the axis, has a speed that can be written.
+fn told_in_time(printer: &Printer, dialect: &Dialect) -> Result<(), Failure> {
+    let least = LEAST_FEED / SECONDS_PER_MINUTE / printer.axis_clearance;
+    let is_path_speed = dialect.space != Space::Part && !dialect.speed.is_of_one_move();
+    if !is_path_speed || printer.bed.speed >= least {
+        return Ok(());
+    }
+    let what = format!(
+        "bed_speed_deg_per_s = {} is too slow for axis_clearance_mm = {}: the program could not say how slow \
+         a move round the axis is, {LEAST_FEED} mm/min at least",
+        shown(printer.bed.speed.to_degrees()),
+        shown(printer.axis_clearance),
+    );
+    let wide = LEAST_FEED / SECONDS_PER_MINUTE / printer.bed.speed;
+    Err(Failure::new("ConfigConflict", what)
+        .hint(format!("set axis_clearance_mm to {:.3} or more", wide + 5e-4)))
+}
+
+const SECONDS_PER_MINUTE: f64 = 60.0;
 
 /// Bound of the bed's turn, radians; 0 turns stand for none.
 fn most_turn(turns: f64) -> f64 {

@@ -137,7 +137,7 @@ impl Acceleration {
                 let ms = time * 1e3;
                 format!(
                     "{what} changes its speed by {change:.3} {unit} within {ms:.3} ms; beyond a \
-                     sudden {sudden} {unit} that is {acceleration:.1} {unit}², its limit is \
+                     sudden {sudden:.3} {unit} that is {acceleration:.1} {unit}², its limit is \
                      {limit:.1} {unit}²"
                 )
             });

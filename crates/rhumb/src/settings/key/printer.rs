@@ -268,7 +268,7 @@ pub(super) const KEYS: &[Key] = &[
         Printer,
         "moves_per_second",
         "moves_per_second",
-        (500.0, 10.0, 100_000.0),
+        (500.0, 20.0, 100_000.0),
         "moves that the firmware takes in a second",
     ),
     number(
