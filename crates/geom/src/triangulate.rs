@@ -3,7 +3,7 @@
 //! Wraps the triangulation of the spade crate, the only module that names it. What lies inside is
 //! decided by the even-odd rule, so rings may come in any direction and any nesting. The ribbon between two
 //! rings, which is what thin walls leave, is triangulated along its way, which is several times faster
-//! ([`ribbon`]).
+//! (`triangulate/ribbon.rs`).
 
 mod ribbon;
 

@@ -1,6 +1,6 @@
 //! Files that go out: whole or not at all.
 //!
-//! What is written goes to a [draft](crate::draft) beside the target and takes the target's place only
+//! What is written goes to a draft (`draft.rs`) beside the target and takes the target's place only
 //! when it is complete and checked. Whatever stops rhumb before, the target keeps its old content
 //! and nothing is left behind. Devices and standard output are written at the very end.
 
