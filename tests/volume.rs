@@ -112,13 +112,24 @@ fn outlines_moved_outwards_gain_at_their_corners() {
     };
     let facets: String = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]].map(facet).concat();
     scratch.file("tetrahedron.stl", format!("solid t\n{facets}endsolid t\n"));
-    let plain = ["slice", "tetrahedron.stl", "-q", "-o", "x.gcode", "--orient", "keep"];
-    for (by, layers) in
-        [("0.3", "planar"), ("1", "planar"), ("2", "planar"), ("2", "conical"), ("2", "caps")]
-    {
+    // Nearly all that becomes of a small block lies beyond its corners.
+    scratch.cube("cube.stl", 2.0);
+    for (model, by, layers) in [
+        ("tetrahedron.stl", "0.3", "planar"),
+        ("tetrahedron.stl", "1", "planar"),
+        ("tetrahedron.stl", "2", "planar"),
+        ("tetrahedron.stl", "2", "caps"),
+        ("cube.stl", "2", "conical"),
+    ] {
         let grown = format!("xy_size_compensation_mm={by}");
+        let plain = ["slice", model, "-q", "-o", "x.gcode", "--orient", "keep"];
         let more = ["--set", &grown, "--set", "fill_density=1", "--layers", layers];
         let ran = scratch.run(&[&plain[..], &more].concat());
-        assert!(matches!(ran.code, Some(0 | 1)), "{by} {layers}: {:?} {}", ran.code, ran.err);
+        assert!(
+            matches!(ran.code, Some(0 | 1)),
+            "{model} {by} {layers}: {:?} {}",
+            ran.code,
+            ran.err
+        );
     }
 }

@@ -516,4 +516,31 @@ mod tests {
         check.end(Some(|_: &[Family], _| mesh), || false, true, &mut findings);
         assert_eq!(findings.checks(), [NAME]);
     }
+
+    /// A cube of 1 mm on curved layers, moved outwards by 2 mm: what lies beyond its sides is most of it.
+    #[test]
+    fn what_is_moved_outwards_gains_at_edges_on_curved_layers_too() {
+        let found = |edges: f64, moved: f64| {
+            let mut check = Volume::new(2.0, 0.4).moved(moved);
+            let mark = LayerMark {
+                line: 1,
+                index: 0,
+                top: Some(1.0),
+                height: Some(1.0),
+                family: None,
+                climbs: false,
+            };
+            check.layer(mark, Some(&section_at(0.5)));
+            let mut rising = segment(joints(5.0, 0.0, 0.5), joints(9.0, 1.0, 1.0), 20.0);
+            rising.filament = 30.0;
+            check.segment(&rising);
+            let mut findings = Findings::default();
+            let cube = Enclosed { volume: 1.0, surface: 6.0, edges, along: 0.0 };
+            check.end(Some(|_: &[Family], _| cube), || false, false, &mut findings);
+            !findings.checks().is_empty()
+        };
+        let edges = 3.0 * std::f64::consts::PI;
+        assert!(!found(edges, 2.0));
+        assert!(found(0.0, 2.0) && found(edges, 0.0));
+    }
 }
