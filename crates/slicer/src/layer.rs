@@ -381,13 +381,18 @@ fn vase_layer(material: &Region, frame: &Frame<'_>, params: &PathParams) -> Fill
 
 /// Whether an island has anything of the layer below under it.
 fn is_carried(island: &Island, below: &Nearby<'_>) -> bool {
+    let below = below.meeting(island);
+    // Nearly always it stands on its like, or a corner of one lies in the other. All are looked at for
+    // that before any is cut: of rings within rings each would be cut with all that are around it.
+    let stands =
+        |on: &&Island| *on == island || has_corner_in(island, on) || has_corner_in(on, island);
+    if below.iter().any(stands) {
+        return true;
+    }
     let outline = Region::from_island(island.clone());
-    below.meeting(island).into_iter().any(|below| {
-        // Nearly always a corner of one lies in the other.
-        has_corner_in(island, below)
-            || has_corner_in(below, island)
-            || !outline.intersection(&Region::from_island(below.clone())).is_empty()
-    })
+    let meets =
+        |other: &Island| !outline.intersection(&Region::from_island(other.clone())).is_empty();
+    below.into_iter().any(meets)
 }
 
 /// Whether the first corner of an island lies in another.
@@ -396,10 +401,11 @@ fn has_corner_in(island: &Island, other: &Island) -> bool {
     corner.is_some_and(|corner| is_inside(other, &mm(*corner)))
 }
 
-/// How far from its box an island looks, mm: many times further than beads and anchors of bridges reach.
+/// How far from its box an island looks for what bridges rest on, mm: many times further than beads and
+/// anchors reach.
 const NEAR_MM: f64 = 10.0;
 
-/// The neighbours of a layer, their islands by place: bridges rest on what is near.
+/// The neighbours of a layer, their islands by place.
 struct Around<'a> {
     above: Vec<Nearby<'a>>,
     below: Vec<Nearby<'a>>,
@@ -414,8 +420,8 @@ impl<'a> Around<'a> {
     }
 }
 
-fn near<'a>(island: &Island, neighbours: &[Nearby<'a>]) -> Vec<Cow<'a, Region>> {
-    neighbours.iter().map(|region| region.around(island, NEAR_MM)).collect()
+fn under<'a>(island: &Island, neighbours: &[Nearby<'a>]) -> Vec<Cow<'a, Region>> {
+    neighbours.iter().map(|region| region.under(island)).collect()
 }
 
 /// Takes an island apart.
@@ -427,19 +433,19 @@ fn part(
     params: &PathParams,
 ) -> PartedIsland {
     let outline = Region::from_island(island.clone());
-    let [above, below] = [&around.above, &around.below].map(|all| near(island, all));
+    let [above, below] = [&around.above, &around.below].map(|all| under(island, all));
     let [above, below] = [&above, &below].map(|all| all.iter().map(AsRef::as_ref).collect());
     let neighbours = &Neighbours { above, below, support: around.support };
     let Frame { chart, thickness, .. } = *frame;
-    let below = neighbours.below.first().copied().filter(|_| frame.lift.level.index > 0);
     let walls = suitable_walls(&outline, hanging, neighbours, frame, params);
     let solid_bead = Bead { width: params.infill.solid_width, thickness };
     let split = split_thin(&walls.interior, &chart, solid_bead.spacing() / 2.0);
     let interior = split.thick.thinned(SKIN_TOLERANCE_MM);
     let spacing = solid_bead.spacing();
     let mut skins = skins(&interior, &chart, neighbours, spacing, &params.skins);
-    let bridges = match below {
-        Some(below) => bridges(&mut skins, below, &chart, spacing),
+    let rests = frame.lift.level.index == 0 || skins.unsupported.is_empty();
+    let bridges = match around.below.first().filter(|_| !rests) {
+        Some(below) => bridges(&mut skins, &below.around(island, NEAR_MM), &chart, spacing),
         None => Vec::new(),
     };
     PartedIsland { outline, walls, thin: split.thin, skins, bridges }
