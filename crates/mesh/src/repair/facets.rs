@@ -4,8 +4,9 @@
 //! without them the surface would be open there.
 //!
 //! Of facets with the same corners in the same direction, the first stays; two do where two solids
-//! inside each other have a side in common, facet for facet, and would else be open there. Facets with
-//! the same corners in opposite directions lie back to back, and that means one of two things:
+//! inside each other have a side in common, facet for facet: both are closed with it, and one of
+//! them is open without. Facets with the same corners in opposite directions lie back to back,
+//! and that means one of two things:
 //!
 //! * a *double skin*, where an exporter wrote one surface with both faces. One of each two must
 //!   go, or the solid counts as nothing;
@@ -14,7 +15,7 @@
 //!
 //! Which one it is shows at the rim: a patch of such pairs is thinned to one face where that
 //! leaves fewer edges with an odd number of facets than keeping both does, or where it closes by
-//! itself; a patch of copies is, unless that leaves more. A double skin that is thinned has no direction of its own; its neighbours decide.
+//! itself. A double skin that is thinned has no direction of its own; its neighbours decide.
 
 use super::{Winding, Work};
 use crate::groups::Groups;
@@ -88,7 +89,8 @@ fn drop_same(work: &Work, edges: &Edges, keep: &mut [bool]) -> Vec<Pair> {
         }
     }
     for (copy, patch) in copies.iter().zip(patches(edges, &copies, keep)) {
-        keep[copy[1] as usize] = patch.odd_if_kept < patch.odd_if_thinned;
+        let closes_both = patch.has_rim && patch.odd_if_kept == 0 && patch.odd_if_thinned > 0;
+        keep[copy[1] as usize] = closes_both;
     }
     pairs
 }

@@ -10,10 +10,13 @@ use super::NONE;
 use super::edges::runs_up;
 use crate::mesh::Mesh;
 use nalgebra::Vector3;
+use std::cmp::Ordering;
 
 /// Triangles closer than this in angle lie in one plane, rad. Facets of one wall that is split by
 /// different diagonals differ by the rounding of their corners, up to 1e-7. Where planes agree,
-/// ups go first: two solids that share a wall then stay two, each with its own side.
+/// ups go first: two solids that share a wall then stay two, each with its own side. Of several
+/// ups or downs, those with a twin (the same triangle the other way round) lie side by side, so
+/// that others find each other past them.
 const SAME_ANGLE_RAD: f64 = 1e-6;
 
 /// Returns pairs of half-edges that enclose material, then half-edges that stay open (with
@@ -49,8 +52,7 @@ fn around(mesh: &Mesh, ends: [u32; 2], halves: &[u32]) -> Vec<u32> {
     let [low, high] = ends.map(|v| mesh.vertices[v as usize]);
     let axis = (high - low).try_normalize(0.0).unwrap_or_default();
     let arm = |half: u32| -> Vector3<f64> {
-        let third = mesh.triangles[half as usize / 3][(half as usize + 2) % 3];
-        let to_third = mesh.vertices[third as usize] - low;
+        let to_third = mesh.vertices[third(mesh, half) as usize] - low;
         to_third - axis * axis.dot(&to_third)
     };
     let zero = halves.iter().find_map(|&half| arm(half).try_normalize(0.0)).unwrap_or_default();
@@ -63,10 +65,41 @@ fn around(mesh: &Mesh, ends: [u32; 2], halves: &[u32]) -> Vec<u32> {
     let mut order: Vec<(f64, u32)> = halves.iter().map(|&half| (angle(half), half)).collect();
     order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let same_plane = |a: &(f64, u32), b: &(f64, u32)| b.0 - a.0 <= SAME_ANGLE_RAD;
-    for plane in order.chunk_by_mut(same_plane) {
-        plane.sort_unstable_by_key(|&(_, half)| (!runs_up(mesh, half), half));
+    let planes = order.chunk_by(same_plane);
+    planes.flat_map(|plane| in_plane(mesh, plane.iter().map(|(_, half)| *half))).collect()
+}
+
+/// The half-edges of one plane in their order.
+fn in_plane(mesh: &Mesh, halves: impl Iterator<Item = u32>) -> Vec<u32> {
+    let mut halves: Vec<u32> = halves.collect();
+    if halves.len() == 1 {
+        return halves;
     }
-    order.into_iter().map(|(_, half)| half).collect()
+    let mut sides: Vec<(u32, bool)> =
+        halves.iter().map(|half| (third(mesh, *half), runs_up(mesh, *half))).collect();
+    sides.sort_unstable();
+    let rank = |half: u32| {
+        let up = runs_up(mesh, half);
+        let has_twin = sides.binary_search(&(third(mesh, half), !up)).is_ok();
+        match (up, has_twin) {
+            (true, false) => 0,
+            (true, true) => 1,
+            (false, true) => 2,
+            (false, false) => 3,
+        }
+    };
+    let position = |half: u32| mesh.vertices[third(mesh, half) as usize];
+    halves.sort_unstable_by(|a, b| {
+        let (p, q) = (position(*a), position(*b));
+        let by_axis = (0..3).map(|axis| p[axis].total_cmp(&q[axis]));
+        by_axis.fold(rank(*a).cmp(&rank(*b)), Ordering::then).then(a.cmp(b))
+    });
+    halves
+}
+
+/// The corner of a half-edge's triangle that lies across from it.
+fn third(mesh: &Mesh, half: u32) -> u32 {
+    mesh.triangles[half as usize / 3][(half as usize + 2) % 3]
 }
 
 #[cfg(test)]
