@@ -114,9 +114,13 @@ impl<'a> Stack<'a> {
             interrupt.check()?;
             let window = from..(from + WINDOW).min(end);
             ahead.reach(&window, |_| {});
-            let core =
-                |k| ahead.part(k).map(|layer| layer.core(&ahead.params(k))).unwrap_or_default();
-            cores.par_extend(window.into_par_iter().map(core));
+            let core = |run: Range<usize>| {
+                let core = |(k, layer): (usize, Option<Parted<'_>>)| {
+                    layer.map(|layer| layer.core(&ahead.params(k))).unwrap_or_default()
+                };
+                run.clone().zip(ahead.part_run(run)).map(core).collect::<Vec<_>>()
+            };
+            cores.par_extend(ahead.runs(window).into_par_iter().flat_map_iter(core));
         }
         let strata = (0..cores.len()).into_par_iter().map(|i| {
             let (core, above) = (&cores[i].0, cores.get(i + 1));
@@ -334,19 +338,24 @@ impl<'a> Stack<'a> {
         }
     }
 
-    /// Fills layers of which each repeats the one before: they are taken apart once.
-    fn fill_run(&self, run: Range<usize>) -> Vec<Filled> {
-        let params = self.params(run.start);
-        let Some(first) = self.part(run.start) else {
-            return run.map(|_| Filled::default()).collect();
+    /// Takes layers apart of which each repeats the one before: once for all.
+    fn part_run(&self, run: Range<usize>) -> Vec<Option<Parted<'_>>> {
+        let first = self.part(run.start);
+        let part = |k: usize| {
+            let again = first.as_ref()?.again_on(&self.lift(k));
+            again.map(|layer| self.branched(layer, k)).or_else(|| self.part(k))
         };
-        let fill = |k: usize| {
-            let again = first.again_on(&self.lift(k)).map(|layer| self.branched(layer, k));
-            let layer = again.or_else(|| self.part(k));
+        let rest: Vec<_> = (run.start + 1..run.end).into_par_iter().map(part).collect();
+        std::iter::once(first).chain(rest).collect()
+    }
+
+    /// Fills layers of which each repeats the one before.
+    fn fill_run(&self, run: Range<usize>) -> Vec<Filled> {
+        let layers = run.clone().into_par_iter().zip(self.part_run(run));
+        let fill = |(k, layer): (usize, Option<Parted<'_>>)| {
             layer.map(|layer| layer.fill(&self.params(k))).unwrap_or_default()
         };
-        let rest: Vec<Filled> = (run.start + 1..run.end).into_par_iter().map(fill).collect();
-        std::iter::once(first.fill(&params)).chain(rest).collect()
+        layers.map(fill).collect()
     }
 
     /// The layers of a window, in runs of such as are the same but for their height.
@@ -363,7 +372,8 @@ impl<'a> Stack<'a> {
 
     /// Whether a layer and all that it is compared with are those of the layer below, one higher.
     fn repeats(&self, k: usize) -> bool {
-        if !self.columns.is_empty() || self.stage.morph.is_some() {
+        let stands_free = |k: usize| self.column(k).is_none_or(Column::is_empty);
+        if self.stage.morph.is_some() || !stands_free(k) || !stands_free(k - 1) {
             return false;
         }
         let ((above, below), (others_above, others_below)) = (self.beside(k), self.beside(k - 1));
@@ -383,8 +393,7 @@ impl<'a> Stack<'a> {
     /// Takes a layer apart; `None` where nothing of it is.
     fn part(&self, k: usize) -> Option<Parted<'_>> {
         let lift = self.lift(k);
-        let support = self.columns.get(k.wrapping_sub(self.stage.printed.start));
-        let support = support.filter(|column| !column.is_empty());
+        let support = self.column(k).filter(|column| !column.is_empty());
         let material = self.material(k, &lift);
         if material.is_empty() && support.is_none() {
             return None;
@@ -400,6 +409,11 @@ impl<'a> Stack<'a> {
         };
         let parted = Parted::new(&lift, &material, &neighbours, &self.params(k)).on(support);
         Some(self.branched(parted, k))
+    }
+
+    /// What of layer `k` is support.
+    fn column(&self, k: usize) -> Option<&'a Column> {
+        self.columns.get(k.wrapping_sub(self.stage.printed.start))
     }
 
     fn branched<'b>(&'b self, parted: Parted<'b>, k: usize) -> Parted<'b> {

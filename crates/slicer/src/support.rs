@@ -10,6 +10,7 @@
 //! it takes to be at least nine tenths of `top_gap` and `bottom_gap` mm. The layers of a column next to the part
 //! are its *interface*, which is filled more densely.
 
+use geom::grid::mm;
 use geom::region::{Fill, Island, Region};
 use nalgebra::Point2;
 use rayon::prelude::*;
@@ -79,7 +80,7 @@ const NOISE_MM: f64 = 0.02;
 const LEAST_MM2: f64 = 0.15;
 
 /// How closely columns follow outlines, mm.
-const TOLERANCE_MM: f64 = 0.05;
+const TOLERANCE_MM: f64 = 0.1;
 
 impl SupportParams {
     /// Returns how far a layer of this thickness may reach beyond the one below, mm.
@@ -127,7 +128,7 @@ pub fn hanging(
 /// Whether every island of a layer has something below it.
 fn carries_all(below: &Region, material: &Region) -> bool {
     material.islands().iter().all(|island| {
-        island.iter().flatten().any(|&p| below.contains(&geom::grid::mm(p)))
+        island.iter().flatten().any(|&p| below.contains(&mm(p)))
             || !Region::from_island(island.clone()).intersection(below).is_empty()
     })
 }
@@ -248,8 +249,7 @@ fn column(
         free = free.difference(&layers[i].material);
     }
     let radius = params.width / 2.0;
-    let reach = disc(params.reach - params.width);
-    let whole = opened(&free.intersection(&reach), radius);
+    let whole = followed(&within(free, params.reach - params.width), radius);
     let mut near = Region::default();
     let first_above = (k + above + 1).min(layers.len());
     for contact in &contacts[first_above..(first_above + params.top_interface).min(layers.len())] {
@@ -259,14 +259,14 @@ fn column(
     for layer in &layers[last_below - params.bottom_interface.min(last_below)..last_below] {
         near = near.union(&layer.material);
     }
-    let interface = opened(&whole.intersection(&near), radius);
+    let interface = followed(&whole.intersection(&near), radius);
     if interface.is_empty() {
         return Column { whole, ..Column::default() };
     }
     // What is left beside it holds lines only where it is wide enough for two of them; dense lines
     // that end short of the edge would lie between the sheath and where the others end.
-    let body = opened(&whole.difference(&interface), params.spacing / 2.0);
-    let interface = opened(&whole.difference(&body), radius);
+    let body = followed(&whole.difference(&interface), params.spacing / 2.0);
+    let interface = followed(&whole.difference(&body), radius);
     Column { whole, interface, carried: Region::default() }
 }
 
@@ -287,18 +287,29 @@ fn gap(wanted: f64, thicknesses: impl Iterator<Item = f64>) -> usize {
     count
 }
 
-/// The part of a region that a disc of the radius can reach without leaving it.
-fn opened(region: &Region, radius: f64) -> Region {
-    if region.is_empty() { Region::default() } else { Chart::Plane.opened(region, radius) }
+/// The part of a region that a disc of the radius can reach without leaving it, as closely as columns
+/// follow outlines: corners beyond that cost time in all that is done with them, and in the machine.
+fn followed(region: &Region, radius: f64) -> Region {
+    let half = TOLERANCE_MM / 2.0;
+    if region.is_empty() {
+        return Region::default();
+    }
+    Chart::Plane.opened(&region.thinned(half), radius).simplified(half)
 }
 
-/// A disc about the axis, from the inside.
-fn disc(radius: f64) -> Region {
+/// What of a region lies within a distance (mm) of the axis.
+fn within(region: Region, reach: f64) -> Region {
+    // A polygon in the circle, and the circle in that.
     const CORNERS: u32 = 256;
+    let step = std::f64::consts::TAU / f64::from(CORNERS);
+    let inner = reach * (step / 2.0).cos();
+    if region.rings().flatten().all(|&p| mm(p).coords.norm() < inner) {
+        return region;
+    }
     let corner = |k: u32| {
-        let angle = std::f64::consts::TAU * f64::from(k) / f64::from(CORNERS);
-        Point2::new(radius * angle.cos(), radius * angle.sin())
+        let angle = step * f64::from(k);
+        Point2::new(reach * angle.cos(), reach * angle.sin())
     };
     let ring: Vec<Point2<f64>> = (0..CORNERS).map(corner).collect();
-    Region::from_rings([ring.as_slice()], Fill::NonZero)
+    region.intersection(&Region::from_rings([ring.as_slice()], Fill::NonZero))
 }

@@ -227,21 +227,19 @@ fn carry(nodes: &mut Vec<Node>, stratum: &Stratum, walls: &Segments, radius: f64
     let Some(bounds) = stratum.closed.bounds() else { return };
     let step = radius / STEPS_IN_RADIUS;
     let (low, high) = (mm(bounds.min), mm(bounds.max));
-    let [columns, rows] = [(low.x, high.x), (low.y, high.y)].map(|(low, high)| {
-        let [first, last] = [(low / step).ceil() as i64, (high / step).floor() as i64];
-        first..=last
-    });
+    let steps = |from: f64, to: f64| (from / step).ceil() as i64..=(to / step).floor() as i64;
     let mut tips: Vec<(f64, Point2<f64>, Point2<f64>)> = Vec::new();
-    for x in columns {
-        for y in rows.clone() {
-            let at = Point2::new(x as f64 * step, y as f64 * step);
-            if !stratum.closed.contains(&at) {
-                continue;
-            }
-            if let Some((wall, off, _)) = walls.nearest(&at, f64::INFINITY)
-                && off > radius
-            {
-                tips.push((off, at, wall));
+    for x in steps(low.x, high.x).map(|column| column as f64 * step) {
+        // A whole column at once: asking for each place would look at all sides again.
+        let [from, to] = [low.y - step, high.y + step].map(|y| Point2::new(x, y));
+        for part in stratum.closed.parts(&from, &to).into_iter().filter(|part| part.inside) {
+            for y in steps(part.from.y, part.to.y).map(|row| row as f64 * step) {
+                let at = Point2::new(x, y);
+                if let Some((wall, off, _)) = walls.nearest(&at, f64::INFINITY)
+                    && off > radius
+                {
+                    tips.push((off, at, wall));
+                }
             }
         }
     }
