@@ -80,7 +80,7 @@ const NOISE_MM: f64 = 0.02;
 const LEAST_MM2: f64 = 0.15;
 
 /// How closely columns follow outlines, mm.
-const TOLERANCE_MM: f64 = 0.1;
+const TOLERANCE_MM: f64 = 0.05;
 
 impl SupportParams {
     /// Returns how far a layer of this thickness may reach beyond the one below, mm.
