@@ -420,8 +420,8 @@ impl<'a> Around<'a> {
     }
 }
 
-fn under<'a>(island: &Island, neighbours: &[Nearby<'a>]) -> Vec<Cow<'a, Region>> {
-    neighbours.iter().map(|region| region.under(island)).collect()
+fn sharing<'a>(island: &Island, neighbours: &[Nearby<'a>]) -> Vec<Cow<'a, Region>> {
+    neighbours.iter().map(|region| region.sharing(island)).collect()
 }
 
 /// Takes an island apart.
@@ -433,7 +433,7 @@ fn part(
     params: &PathParams,
 ) -> PartedIsland {
     let outline = Region::from_island(island.clone());
-    let [above, below] = [&around.above, &around.below].map(|all| under(island, all));
+    let [above, below] = [&around.above, &around.below].map(|all| sharing(island, all));
     let [above, below] = [&above, &below].map(|all| all.iter().map(AsRef::as_ref).collect());
     let neighbours = &Neighbours { above, below, support: around.support };
     let Frame { chart, thickness, .. } = *frame;

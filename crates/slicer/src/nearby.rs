@@ -42,7 +42,7 @@ impl<'a> Nearby<'a> {
 
     /// Returns the islands that have a place in common with an island, and perhaps others near it; all
     /// of a region of few.
-    pub(crate) fn under(&self, island: &Island) -> Cow<'a, Region> {
+    pub(crate) fn sharing(&self, island: &Island) -> Cow<'a, Region> {
         self.boxes.as_ref().map_or(Cow::Borrowed(self.region), |boxes| {
             Cow::Owned(self.region.selected(&self.touching(boxes, island)))
         })
@@ -134,7 +134,7 @@ mod tests {
         let nearby = Nearby::of(&region);
         for island in region.islands() {
             assert_eq!(nearby.meeting(island), [island]);
-            assert_eq!(nearby.under(island).islands(), std::slice::from_ref(island));
+            assert_eq!(nearby.sharing(island).islands(), std::slice::from_ref(island));
             let mut turned = island.clone();
             turned.iter_mut().for_each(|ring| ring.rotate_left(1));
             assert_eq!(nearby.meeting(&turned), [island]);
