@@ -66,8 +66,8 @@ fn by_place(solid: &Solid, a: u32, b: u32) -> Ordering {
     let ends = |half: u32| [position(half), position(after(half))];
     let (a_ends, b_ends) = (ends(a), ends(b));
     let coordinates = zip(a_ends, b_ends).flat_map(|(p, q)| zip(&p.coords, &q.coords));
-    let by_axis = coordinates.map(|(p, q)| p.total_cmp(q));
-    by_axis.fold(Ordering::Equal, Ordering::then).then(a.cmp(&b))
+    let mut by_axis = coordinates.map(|(p, q)| p.total_cmp(q));
+    by_axis.find(|order| order.is_ne()).unwrap_or_else(|| a.cmp(&b))
 }
 
 /// The rim that open sides form.
