@@ -225,6 +225,15 @@ mod tests {
     }
 
     #[test]
+    fn a_copy_beside_holes_goes() {
+        // Two of the three neighbours of the doubled facet are missing.
+        let mut mesh = cube_and(|t| vec![t[5]]);
+        mesh.triangles.remove(4);
+        mesh.triangles.remove(2);
+        assert_eq!(outcome(mesh), [1, 10, 0]);
+    }
+
+    #[test]
     fn a_side_that_two_solids_share_stays_twice() {
         // A lower block inside the cube, on the same two facets.
         let mut mesh = shapes::cube(20.0);

@@ -185,6 +185,24 @@ mod tests {
     }
 
     #[test]
+    fn rims_begin_and_come_by_position() {
+        let places = |mesh: &Mesh| -> Vec<Vec<[f64; 3]>> {
+            let place = |v: &u32| mesh.vertices[*v as usize].coords.into();
+            let rims = rims(&Solid::new(mesh.clone()));
+            rims.iter().map(|rim| rim.vertices.iter().map(place).collect()).collect()
+        };
+        let mut ball = shapes::icosphere(1, 10.0);
+        for missing in [70, 40, 39, 5] {
+            ball.triangles.remove(missing);
+        }
+        let mut turned = ball.clone();
+        turned.vertices.reverse();
+        let last = turned.vertices.len() as u32 - 1;
+        turned.triangles.iter_mut().flatten().for_each(|v| *v = last - *v);
+        assert_eq!(places(&ball), places(&turned));
+    }
+
+    #[test]
     fn a_closed_surface_has_none() {
         assert!(rims(&Solid::new(shapes::torus(20.0, 5.0, 12, 8))).is_empty());
     }
