@@ -724,6 +724,9 @@ M84
 ; ironing_speed = 20
 ; xy_size_compensation = 0
 ; hole_size_compensation = 0
+; hole_to_polyhole = 0
+; hole_to_polyhole_threshold = 0.01
+; hole_to_polyhole_twisted = 1
 ; elefant_foot_compensation = 0
 ; fuzzy_skin = 0
 ; fuzzy_skin_thickness = 0.3

@@ -21,6 +21,7 @@ mod curved_walls;
 mod environment;
 mod golden;
 mod habits;
+mod holes;
 mod house;
 mod interrupt;
 mod lens;

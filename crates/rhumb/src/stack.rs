@@ -20,6 +20,7 @@ use slicer::infill::lightning::{Branches, Stratum, grow};
 use slicer::layer::{Filled, Parted, PathParams};
 use slicer::level::Level;
 use slicer::lift::Lift;
+use slicer::polyhole::{Bore, PolyholeParams, bores, with_polyholes};
 use slicer::section::{Cutter, Section, Tears};
 use slicer::skins::{Neighbours, SKIN_TOLERANCE_MM};
 use slicer::stacking::Stair;
@@ -181,6 +182,9 @@ impl<'a> Stack<'a> {
                 let is_first = level.index == 0 && self.stage.floor.is_none();
                 let chart = self.stage.surface.chart(level.middle());
                 let how = &self.job.paths.compensation;
+                if let Some(polyholes) = &how.polyholes {
+                    section.region = self.with_polyholes(section.region, k, &chart, polyholes);
+                }
                 if *how != CompensationParams::default() {
                     section.region = compensated(section.region, is_first, &chart, how);
                 }
@@ -201,6 +205,34 @@ impl<'a> Stack<'a> {
                 self.sections[i].bare = Some(bare);
             }
         }
+    }
+
+    /// A section of layer `k` whose upright bores, those that a layer above or below has too, are polygons.
+    fn with_polyholes(
+        &self,
+        section: Region,
+        k: usize,
+        chart: &Chart,
+        params: &PolyholeParams,
+    ) -> Region {
+        let tolerance = self.job.paths.tolerance;
+        let found = bores(&section, chart, tolerance, params);
+        if found.is_empty() {
+            return section;
+        }
+        let beside = [k.checked_sub(1), Some(k + 1).filter(|k| *k < self.stage.levels.len())];
+        let beside: Vec<Bore> = beside
+            .into_iter()
+            .flatten()
+            .flat_map(|k| {
+                let chart = self.stage.surface.chart(self.stage.levels[k].middle());
+                bores(&self.section(k).region, &chart, tolerance, params)
+            })
+            .collect();
+        let goes_on = |bore: &&Bore| beside.iter().any(|b| b.is_like(bore, params.threshold));
+        let upright: Vec<Bore> = found.iter().filter(goes_on).copied().collect();
+        let is_odd = self.stage.levels[k].index % 2 == 1;
+        with_polyholes(&section, &upright, is_odd, chart, params)
     }
 
     /// Where the wedge of a layer on the floor is too narrow for a bead, in its chart.

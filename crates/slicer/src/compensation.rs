@@ -6,6 +6,7 @@
 use geom::region::{Fill, Island, Region, Ring};
 
 use crate::chart::Chart;
+use crate::polyhole::PolyholeParams;
 
 /// How far outlines move, mm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -16,6 +17,8 @@ pub struct CompensationParams {
     pub holes: f64,
     /// Outlines of the first layer, inwards.
     pub first_layer: f64,
+    /// Which round holes become polygons before that, if any do.
+    pub polyholes: Option<PolyholeParams>,
 }
 
 impl CompensationParams {
@@ -23,7 +26,8 @@ impl CompensationParams {
     /// move inwards.
     #[must_use]
     pub fn greatest(&self) -> f64 {
-        let by = self.all.abs() + self.holes.abs().max(self.first_layer);
+        let polyholes = self.polyholes.map_or(0.0, |how| how.greatest());
+        let by = self.all.abs() + self.holes.abs().max(self.first_layer) + polyholes;
         if self.all > 0.0 || self.holes < 0.0 { by } else { -by }
     }
 }

@@ -26,6 +26,7 @@ pub mod level;
 pub mod lift;
 mod nearby;
 pub mod overhang;
+pub mod polyhole;
 pub mod section;
 pub mod skins;
 pub mod stacking;

@@ -7,7 +7,7 @@ use super::prusa::{self, Imported};
 use crate::failure::Failure;
 
 /// What keys of OrcaSlicer are called in PrusaSlicer, where they mean the same.
-const NAMES: [(&str, &str); 59] = [
+const NAMES: [(&str, &str); 62] = [
     ("initial_layer_print_height", "first_layer_height"),
     ("wall_loops", "perimeters"),
     ("outer_wall_line_width", "external_perimeter_extrusion_width"),
@@ -38,6 +38,9 @@ const NAMES: [(&str, &str); 59] = [
     ("spiral_mode", "spiral_vase"),
     ("xy_contour_compensation", "xy_size_compensation"),
     ("elefant_foot_compensation", "elefant_foot_compensation"),
+    ("hole_to_polyhole", "hole_to_polyhole"),
+    ("hole_to_polyhole_threshold", "hole_to_polyhole_threshold"),
+    ("hole_to_polyhole_twisted", "hole_to_polyhole_twisted"),
     ("outer_wall_speed", "external_perimeter_speed"),
     ("inner_wall_speed", "perimeter_speed"),
     ("sparse_infill_speed", "infill_speed"),

@@ -7,6 +7,7 @@ use slicer::compensation::CompensationParams;
 use slicer::fuzzy::FuzzyParams;
 use slicer::infill::{InfillParams, IroningParams, Pattern, SolidPattern};
 use slicer::layer::{FirstLayerParams, PathParams};
+use slicer::polyhole::PolyholeParams;
 use slicer::skins::SkinParams;
 use slicer::support::{SupportParams, SupportPattern};
 use slicer::thin::ThinParams;
@@ -77,6 +78,11 @@ pub(super) fn paths(get: &Lookup<'_>, printer: &Printer, tolerances: &Tolerances
             all: get.number("xy_size_compensation_mm"),
             holes: get.number("hole_size_compensation_mm"),
             first_layer: get.number("elefant_foot_compensation_mm"),
+            polyholes: get.switch("hole_to_polyhole").then(|| PolyholeParams {
+                threshold: get.number("hole_to_polyhole_threshold_mm"),
+                is_twisted: get.switch("hole_to_polyhole_twisted"),
+                nozzle: get.number("nozzle_diameter_mm"),
+            }),
         },
         fuzzy: get.switch("fuzzy_skin").then(|| FuzzyParams {
             depth: get.number("fuzzy_skin_thickness_mm"),
