@@ -471,8 +471,16 @@ impl<'a> Stack<'a> {
             hanging(&material, &below, &chart, thickness, params)
         });
         let seen = |region: &Region| chart.region_from_above(region).thinned(SEEN_TOLERANCE_MM);
+        // What is too low to be laid stands there all the same, in the layers of the floor.
+        let standing = if lift.floor.is_some() {
+            let section = &self.sections[k - self.first].section.region;
+            let section = self.at_upper(section, k, k, &lift);
+            Cow::Owned(Lift { floor: None, ..lift }.printable(&section))
+        } else {
+            material
+        };
         Shade {
-            material: seen(&material),
+            material: seen(&standing),
             hanging: hanging.map(|region| seen(&region)).unwrap_or_default(),
             thickness,
         }

@@ -21,6 +21,20 @@ use rhumb::progress::Silent;
 use rhumb::settings::merge::Sources;
 use rhumb::settings::{Job, Settings, file, key::Section, prusa, template};
 
+/// The door of this name.
+#[must_use]
+pub fn door(name: &str) -> Option<fn(&[u8])> {
+    let doors: [(&str, fn(&[u8])); 6] = [
+        ("stl", stl),
+        ("model", model),
+        ("gcode", gcode),
+        ("settings", settings),
+        ("calibration", calibration),
+        ("chain", chain),
+    ];
+    doors.into_iter().find(|door| door.0 == name).map(|door| door.1)
+}
+
 /// The job of the built-in profiles.
 fn job() -> &'static (Settings, Job) {
     static JOB: OnceLock<(Settings, Job)> = OnceLock::new();
