@@ -198,6 +198,8 @@ fn supports_of_curved_layers_begin_on_the_bed_and_carry_the_part() {
     for layers in [
         ["--layers=conical", "--cone-angle=15"],
         ["--layers=conical", "--cone-angle=-15"],
+        ["--layers=conical", "--cone-angle=-20"],
+        ["--layers=caps", "--cap-radius=30"],
         ["--layers=spherical", "--sphere-centre=-40"],
     ] {
         let scratch = Scratch::new();

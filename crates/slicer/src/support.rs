@@ -10,9 +10,9 @@
 //! it takes to be at least nine tenths of `top_gap` and `bottom_gap` mm. The layers of a column next to the part
 //! are its *interface*, which is filled more densely.
 
-use geom::grid::mm;
-use geom::region::{Fill, Island, Region};
-use nalgebra::Point2;
+use geom::grid::{mm, snap};
+use geom::region::{Fill, Island, Region, Ring};
+use nalgebra::{Point2, Rotation2};
 use rayon::prelude::*;
 
 use crate::bridge::spanned;
@@ -263,11 +263,58 @@ fn column(
     if interface.is_empty() {
         return Column { whole, ..Column::default() };
     }
-    // What is left beside it holds lines only where it is wide enough for two of them; dense lines
-    // that end short of the edge would lie between the sheath and where the others end.
-    let body = followed(&whole.difference(&interface), params.spacing / 2.0);
+    let (interface, room) = if params.pattern == SupportPattern::Rectilinear {
+        (from_line_to_line(&interface, params), params.width)
+    } else {
+        // What is left beside it holds lines only where it is wide enough for two of them; dense lines
+        // that end short of the edge would lie between the sheath and where the others end.
+        (interface, params.spacing / 2.0)
+    };
+    let body = followed(&whole.difference(&interface), room);
     let interface = followed(&whole.difference(&body), radius);
     Column { whole, interface, carried: Region::default() }
+}
+
+/// An interface that reaches up to the lines of a column on both sides, where these run the same way in
+/// every layer: its own lines, across them, then end on one, and so do those of the next layer, which on
+/// a slope begin a little beside.
+fn from_line_to_line(interface: &Region, params: &SupportParams) -> Region {
+    let (pitch, width) = (params.spacing + params.width, params.width);
+    let row = |v: f64| ((v - pitch / 2.0) / pitch).floor();
+    let at = |row: f64| pitch / 2.0 + pitch * row;
+    let to_rows = Rotation2::new(-params.angle);
+    let along_rows = turned(interface, &to_rows);
+    let Some(bounds) = along_rows.bounds() else { return Region::default() };
+    let (low, high) = (mm(bounds.min), mm(bounds.max));
+    let bands = (row(low.y) as i64..=row(high.y) as i64).map(|k| {
+        let [from, to] = [at(k as f64), at(k as f64 + 1.0)];
+        block([low.x - pitch, high.x + pitch], [from + width / 2.0, to - width / 2.0])
+    });
+    let pieces = along_rows.intersection(&union_of(bands));
+    // Over the lines by half a bead, so that ends lie on them for sure.
+    let reaching = pieces.islands().iter().filter_map(|island| {
+        let bounds = Region::from_island(island.clone()).bounds()?;
+        let (low, high) = (mm(bounds.min), mm(bounds.max));
+        let k = row(f64::midpoint(low.y, high.y));
+        Some(block([low.x, high.x], [at(k) - width, at(k + 1.0) + width]))
+    });
+    interface.union(&turned(&union_of(reaching), &to_rows.inverse()))
+}
+
+/// The corners of an upright rectangle, mm.
+fn block([left, right]: [f64; 2], [low, high]: [f64; 2]) -> [Point2<f64>; 4] {
+    [[left, low], [right, low], [right, high], [left, high]].map(Point2::from)
+}
+
+fn union_of(blocks: impl Iterator<Item = [Point2<f64>; 4]>) -> Region {
+    let blocks: Vec<[Point2<f64>; 4]> = blocks.collect();
+    Region::from_rings(blocks.iter().map(<[_; 4]>::as_slice), Fill::NonZero)
+}
+
+fn turned(region: &Region, by: &Rotation2<f64>) -> Region {
+    let turned = |ring: &Ring| ring.iter().map(|&p| snap(&(by * mm(p)))).collect();
+    let rings: Vec<Ring> = region.rings().map(turned).collect();
+    Region::from_grid_rings(&rings, Fill::Positive)
 }
 
 /// How many layers it takes to keep a gap, of these thicknesses in their order.
