@@ -224,6 +224,22 @@ fn supports_of_curved_layers_begin_on_the_bed_and_carry_the_part() {
     }
 }
 
+/// Columns of a bowl begin where it meets its planar layers, and their dense layers climb with it: none of
+/// their lines runs over the gap around the stem, or ends between two lines below.
+#[test]
+fn lines_of_supports_lie_on_those_of_the_layer_below() {
+    let scratch = Scratch::new();
+    let file = model("umbrella");
+    let mut all = vec!["slice", file.to_str().unwrap(), "-q", "-o", "x.gcode", "--scale", "0.6"];
+    all.extend(["--layers=conical", "--cone-angle=-10", "--orient", "keep"]);
+    all.extend(["--verify", "full", "--report", "r.json"]);
+    all.extend(ON);
+    assert!(matches!(scratch.run(&all).code, Some(0 | 1)));
+    let report = std::fs::read(scratch.path("r.json")).unwrap();
+    let report: Value = serde_json::from_slice(&report).unwrap();
+    assert_eq!(report["verify"]["findings"], Value::Array(Vec::new()));
+}
+
 /// A part that is turned is supported the same.
 #[test]
 fn turning_a_part_turns_its_supports() {
