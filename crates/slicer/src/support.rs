@@ -249,7 +249,8 @@ fn column(
         free = free.difference(&layers[i].material);
     }
     let radius = params.width / 2.0;
-    let whole = followed(&within(free, params.reach - params.width), radius);
+    // Too narrow for a bead are places of it that no line comes to: nothing need be done about them.
+    let whole = within(free, params.reach - params.width).simplified(TOLERANCE_MM);
     let mut near = Region::default();
     let first_above = (k + above + 1).min(layers.len());
     for contact in &contacts[first_above..(first_above + params.top_interface).min(layers.len())] {
