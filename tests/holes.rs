@@ -39,6 +39,12 @@ fn reach(seen: &[(usize, f64, f64)], layer: usize) -> [f64; 2] {
     of_layer.fold([f64::MAX, 0.0], |[least, most], d| [least.min(d), most.max(d)])
 }
 
+/// The direction of a corner, by sixths of a turn.
+fn corner(seen: &[(usize, f64, f64)], layer: usize) -> f64 {
+    let farthest = seen.iter().filter(|s| s.0 == layer).max_by(|a, b| a.1.total_cmp(&b.1));
+    farthest.unwrap().2.rem_euclid(FRAC_PI_3)
+}
+
 #[test]
 fn bores_become_hexagons_that_let_the_screw_through() {
     // Half a bead of 0.45 mm outside of the circle, and round the corners.
@@ -62,14 +68,29 @@ fn bores_become_hexagons_that_let_the_screw_through() {
             assert!((far - 3.0 - 0.225).abs() < 2.0 * slack, "{far}");
         }
         // Corners of a layer stand over the middles of the sides below.
-        let corner = |layer: usize| {
-            let farthest = bore.iter().filter(|s| s.0 == layer).max_by(|a, b| a.1.total_cmp(&b.1));
-            farthest.unwrap().2.rem_euclid(FRAC_PI_3)
-        };
         for pair in layers.windows(2) {
-            let turn = (corner(pair[1]) - corner(pair[0])).rem_euclid(FRAC_PI_3);
+            let turn = corner(&bore, pair[1]) - corner(&bore, pair[0]);
+            let turn = turn.rem_euclid(FRAC_PI_3);
             assert!((turn - PI / 6.0).abs() < 0.05, "{surface:?}: {turn}");
         }
+    }
+}
+
+/// So does the layer on the bed, below which there is none to tell that the bore goes straight up.
+#[test]
+fn hexagons_begin_on_the_bed_and_turn_with_the_part() {
+    const ON: [&str; 2] = ["--set", "hole_to_polyhole=true"];
+    let straight = sliced(&plate(), &ON);
+    let straight = around(&motions(&straight), BORE);
+    let [_, far] = reach(&straight, 0);
+    assert!((far - 1.5 / FRAC_PI_3.sin() - 0.225).abs() < 0.02, "{far}");
+    let angle: f64 = 20.0_f64.to_radians();
+    let turned = sliced(&plate(), &[&ON[..], &["--rotate-z", "20"]].concat());
+    let turned = around(&motions(&turned), [BORE[0] * angle.cos(), BORE[0] * angle.sin()]);
+    for layer in [0, 1, 40] {
+        let by = corner(&turned, layer) - corner(&straight, layer) - angle;
+        let off = (by + FRAC_PI_3 / 2.0).rem_euclid(FRAC_PI_3) - FRAC_PI_3 / 2.0;
+        assert!(off.abs() < 0.05, "{layer}: {off}");
     }
 }
 

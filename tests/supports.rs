@@ -240,6 +240,18 @@ fn lines_of_supports_lie_on_those_of_the_layer_below() {
     assert_eq!(report["verify"]["findings"], Value::Array(Vec::new()));
 }
 
+/// Without a loop around the column, too, no line runs along the edge of a wedge, where hardly any of its
+/// width has room.
+#[test]
+fn columns_without_a_sheath_pass_the_proof_on_curved_layers() {
+    let file = model("umbrella");
+    let mut all = vec!["slice", file.to_str().unwrap(), "-q", "-o", "x.gcode", "--scale", "0.6"];
+    all.extend(["--layers=caps", "--cap-radius=40"]);
+    all.extend(["--set", "support_material_with_sheath=false"]);
+    all.extend(ON);
+    Scratch::new().run(&all).expect(0);
+}
+
 /// A part that is turned is supported the same.
 #[test]
 fn turning_a_part_turns_its_supports() {

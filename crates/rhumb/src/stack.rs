@@ -208,6 +208,7 @@ impl<'a> Stack<'a> {
     }
 
     /// A section of layer `k` whose upright bores, those that a layer above or below has too, are polygons.
+    /// Layers beside are cut once more for that: few prints ask for it, and few layers have round holes.
     fn with_polyholes(
         &self,
         section: Region,

@@ -8,7 +8,8 @@
 //!
 //! Supports keep a gap to the part: aside `xy_gap` mm, and above and below as many whole layers as
 //! it takes to be at least nine tenths of `top_gap` and `bottom_gap` mm. The layers of a column next to the part
-//! are its *interface*, which is filled more densely.
+//! are its *interface*, which is filled more densely, and reaches from line to line of the column: on
+//! sloping layers it begins in each of them a little beside the one below, and would hang there.
 
 use geom::grid::{mm, snap};
 use geom::region::{Fill, Island, Region, Ring};

@@ -29,7 +29,8 @@ pub(crate) fn lines(
     let support = Support { layer, params, bead };
     let mut lines = Vec::new();
     let on_bed = layer.index == 0;
-    let body = laid(&column.whole.difference(&column.interface));
+    let beside = column.whole.difference(&column.interface);
+    let body = laid(&beside);
     if on_bed {
         // All of it holds on to the bed.
         for island in body.islands() {
@@ -37,7 +38,7 @@ pub(crate) fn lines(
             support.dense(&area, Role::SupportMaterial, 0.0, &mut lines);
         }
     } else if !body.is_empty() {
-        support.body(&column.whole, &body, &mut lines);
+        support.body(&column.whole, &beside, &body, &mut lines);
     }
     for island in laid(&column.interface).islands() {
         let area = Region::from_island(island.clone());
@@ -54,8 +55,9 @@ struct Support<'a> {
 
 impl Support<'_> {
     /// Lines that stand on those of the layer below, and one around the column. What of it is no
-    /// interface, and laid, has edges where it has no sides: lines end there without more ado.
-    fn body(&self, column: &Region, body: &Region, lines: &mut Vec<FillLine>) {
+    /// interface (`beside`), and laid (`body`), has edges where it has no sides: lines end there without
+    /// more ado.
+    fn body(&self, column: &Region, beside: &Region, body: &Region, lines: &mut Vec<FillLine>) {
         let (bead, role, params) = (self.bead, Role::SupportMaterial, self.params);
         let rim = column.inset(bead.width / 2.0);
         if params.sheath {
@@ -81,8 +83,11 @@ impl Support<'_> {
                 clipped(&core, &courses).chords
             }
         };
-        // Without a loop around, lines hold each other along the rim.
-        let longest = if params.sheath { 0.0 } else { JOIN_IN_SPACINGS * pitch };
+        // Without a loop around, lines hold each other along the rim, unless that is the edge of a wedge,
+        // where a line along it has no room.
+        let is_whole = || beside.difference(body).inset(bead.width / 4.0).is_empty();
+        let is_joined = !params.sheath && is_whole();
+        let longest = if is_joined { JOIN_IN_SPACINGS * pitch } else { 0.0 };
         let joins = JoinParams { longest, fill_rim: false };
         lines.extend(self.open(&core, &chords, &joins, role, bead));
     }
