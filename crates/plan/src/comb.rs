@@ -7,6 +7,7 @@
 //!
 //! All points are seen from above, mm.
 
+use geom::bands::Bands;
 use geom::grid::mm;
 use geom::region::{Region, ring_sides};
 use nalgebra::{Point2, distance};
@@ -24,7 +25,7 @@ pub(crate) struct Comb {
     /// Outlines, drawn in by what travel keeps from them.
     rim: Region,
     /// What travel may not leave; half as far in.
-    within: Region,
+    within: Bands,
 }
 
 /// Where a straight way crosses the rim.
@@ -39,7 +40,8 @@ impl Comb {
     /// Returns the comb of an island whose travel keeps `keep` mm from its outlines.
     pub(crate) fn new(outline: &Region, keep: f64) -> Self {
         let tolerance = RIM_TOLERANCE_MM.min(keep / 4.0);
-        Self { rim: outline.inset(keep).simplified(tolerance), within: outline.inset(keep / 2.0) }
+        let within = Bands::of(&outline.inset(keep / 2.0));
+        Self { rim: outline.inset(keep).simplified(tolerance), within }
     }
 
     /// Returns a way from `a` to `b` inside the island, without `a`; `None` where there is none.

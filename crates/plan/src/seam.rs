@@ -187,14 +187,12 @@ fn hides(points: &[Point2<f64>], i: usize) -> f64 {
 fn sharpest_corner(points: &[Point2<f64>]) -> usize {
     // Without a corner, and among equal ones: the point farthest along +x, which in the frame of
     // the slicer turns with the part. Equal to a hundredth of a radian: steps are not all alike.
-    let better = |a: &usize, b: &usize| {
-        let (wa, wb) = (hides(points, *a), hides(points, *b));
-        let (pa, pb) = (points[*a], points[*b]);
-        ((wa * 1e2).round().total_cmp(&(wb * 1e2).round()))
-            .then(pa.x.total_cmp(&pb.x))
-            .then(pa.y.total_cmp(&pb.y))
+    let weighed = (0..points.len()).map(|i| (i, (hides(points, i) * 1e2).round()));
+    let better = |(a, weight): &(usize, f64), (b, other): &(usize, f64)| {
+        let (a, b) = (points[*a], points[*b]);
+        weight.total_cmp(other).then(a.x.total_cmp(&b.x)).then(a.y.total_cmp(&b.y))
     };
-    (0..points.len()).max_by(better).expect("lines have points")
+    weighed.max_by(better).expect("lines have points").0
 }
 
 #[cfg(test)]

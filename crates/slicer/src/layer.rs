@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use geom::bands::Bands;
 use geom::grid::{GridPoint, mm};
 use geom::region::{Fill, Island, Region, Ring, is_inside};
 use nalgebra::{Point2, Point3};
@@ -483,7 +484,7 @@ fn fill_island(
     let rough = params.fuzzy.filter(|_| index > 0);
     let room = rough.map(|how| {
         let between = params.walls.external_width / 2.0 + fuzzy::APART_SHARE * how.depth;
-        frame.chart.inset(outline, between)
+        Bands::of(&frame.chart.inset(outline, between))
     });
     let groups = walls.groups.iter().map(|group| {
         let loops = group.iter().map(|wall| {

@@ -13,9 +13,9 @@
 //! these *tight* places their beads overlap and hold only what the place holds. An inset tells for
 //! nothing whether there are any such places, so parts without them pay nothing.
 
-use geom::grid::mm;
+use geom::grid::{GridPoint, mm};
 use geom::polyline::nearest_on_ring;
-use geom::region::{Island, Part, Region, Ring, ring_length, ring_sides, signed_area};
+use geom::region::{GridBounds, Island, Part, Region, Ring, ring_length, ring_sides, signed_area};
 use nalgebra::Point2;
 
 use crate::bead::Bead;
@@ -239,19 +239,23 @@ fn add_to_group(groups: &mut Vec<Vec<WallLoop>>, added: WallLoop, width: f64, is
 /// The beads of a wall in tight places: all that is laid in a place has just its volume.
 struct TightBeads {
     places: Vec<(Region, Bead)>,
+    /// The boxes around them: most of a wall is near none.
+    boxes: Vec<GridBounds>,
 }
 
 impl TightBeads {
     /// `lines` are all centrelines that run through the places.
     fn new(tight: &Region, lines: &Region, bead: Bead) -> Self {
-        let places = tight
+        let places: Vec<(Region, Bead)> = tight
             .islands()
             .iter()
             .map(|island| {
                 let place = Region::from_island(island.clone());
+                let around = place.bounds();
                 let length: f64 = lines
                     .rings()
                     .flat_map(|ring| ring_sides(ring))
+                    .filter(|side| around.is_some_and(|around| may_meet(&around, side)))
                     .flat_map(|(a, b)| place.parts(&mm(a), &mm(b)))
                     .filter(|part| part.inside)
                     .map(|part| part.length())
@@ -262,7 +266,8 @@ impl TightBeads {
                 (place, Bead::with_spacing(spacing, bead.thickness))
             })
             .collect();
-        Self { places }
+        let boxes = places.iter().filter_map(|(place, _)| place.bounds()).collect();
+        Self { places, boxes }
     }
 
     /// The points of a centreline with their beads; where the bead changes there are two.
@@ -270,7 +275,8 @@ impl TightBeads {
         let mut points: Vec<(Point2<f64>, Bead)> = Vec::with_capacity(ring.len());
         for (a, b) in ring_sides(ring) {
             let mut pieces = vec![(Part { from: mm(a), to: mm(b), inside: false }, bead)];
-            for (place, narrow) in &self.places {
+            let near = self.places.iter().zip(&self.boxes);
+            for ((place, narrow), _) in near.filter(|(_, around)| may_meet(around, &(a, b))) {
                 pieces = pieces
                     .into_iter()
                     .flat_map(|(piece, old)| {
@@ -296,6 +302,14 @@ impl TightBeads {
         points.pop();
         points
     }
+}
+
+/// Whether a side comes into a box.
+fn may_meet(around: &GridBounds, (a, b): &(GridPoint, GridPoint)) -> bool {
+    a.x.max(b.x) >= around.min.x
+        && a.x.min(b.x) <= around.max.x
+        && a.y.max(b.y) >= around.min.y
+        && a.y.min(b.y) <= around.max.y
 }
 
 fn area_sign(points: &[Point2<f64>]) -> f64 {
