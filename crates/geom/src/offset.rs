@@ -27,9 +27,9 @@ pub use moved_sides::{MovedSides, ShortSides};
 /// (their budget is 4 µm rms); smaller multiplies the points of every later step.
 pub const ARC_TOLERANCE_MM: f64 = 0.001;
 
-/// The same for [`Region::opened`], which looks for places and does not draw them: a tenth of the
-/// points of exact arcs, which every later step would pay for.
-pub const OPENING_TOLERANCE_MM: f64 = 0.01;
+/// The same where nobody looks closely: for [`Region::opened`], which looks for places and does not draw
+/// them, and for supports. A tenth of the points of exact arcs, which every later step would pay for.
+pub const COARSE_TOLERANCE_MM: f64 = 0.01;
 
 impl Region {
     /// Returns the points of the region at least `distance` (mm, not negative) from its border.
@@ -45,19 +45,31 @@ impl Region {
         self.shifted(-distance, &EXACT)
     }
 
+    /// Like [`inset`](Self::inset), with arcs to within [`COARSE_TOLERANCE_MM`].
+    #[must_use]
+    pub fn inset_coarsely(&self, distance: f64) -> Self {
+        self.shifted(distance, &COARSE)
+    }
+
+    /// Like [`outset`](Self::outset), with arcs to within [`COARSE_TOLERANCE_MM`].
+    #[must_use]
+    pub fn outset_coarsely(&self, distance: f64) -> Self {
+        self.shifted(-distance, &COARSE)
+    }
+
     /// Like [`outset`](Self::outset), with convex corners kept sharp as long as they reach no
     /// farther than [`LONGEST_MITER`] times the distance, and arcs to within
-    /// [`OPENING_TOLERANCE_MM`].
+    /// [`COARSE_TOLERANCE_MM`].
     #[must_use]
     pub fn outset_sharp(&self, distance: f64) -> Self {
         self.shifted(
             -distance,
-            &Arcs { tolerance: OPENING_TOLERANCE_MM, longest_miter: LONGEST_MITER },
+            &Arcs { tolerance: COARSE_TOLERANCE_MM, longest_miter: LONGEST_MITER },
         )
     }
 
     /// Returns the part of the region that a disc of `radius` (mm) inside it can sweep, to within
-    /// [`OPENING_TOLERANCE_MM`].
+    /// [`COARSE_TOLERANCE_MM`].
     #[must_use]
     pub fn opened(&self, radius: f64) -> Self {
         self.shifted(radius, &COARSE).shifted(-radius, &COARSE)
@@ -156,7 +168,7 @@ impl Arcs {
 
 const EXACT: Arcs = Arcs { tolerance: ARC_TOLERANCE_MM, longest_miter: 0.0 };
 
-const COARSE: Arcs = Arcs { tolerance: OPENING_TOLERANCE_MM, longest_miter: 0.0 };
+const COARSE: Arcs = Arcs { tolerance: COARSE_TOLERANCE_MM, longest_miter: 0.0 };
 
 /// Corners of an outset that may stay sharp reach this many distances at most: those over 19°.
 pub const LONGEST_MITER: f64 = 6.0;

@@ -13,7 +13,7 @@ use i_overlay::core::overlay::{Overlay, ShapeType};
 use i_overlay::core::overlay_rule::OverlayRule;
 use nalgebra::Point2;
 
-use crate::boolean::{self, Side};
+use crate::boolean::{self, Side, Windings};
 use crate::grid::{GridPoint, STEPS_PER_MM, mm, snap};
 use crate::simplify::simplify_ring;
 
@@ -290,14 +290,7 @@ impl Region {
         let subject = self.rings().map(|ring| (ring.as_slice(), Side::Subject));
         let clip = other.rings().map(|ring| (ring.as_slice(), Side::Clip));
         let both = subject.chain(clip);
-        let resolved = boolean::resolved(both, |windings| {
-            let (subject, clip) = (windings.subject != 0, windings.clip != 0);
-            match rule {
-                OverlayRule::Union => subject || clip,
-                OverlayRule::Intersect => subject && clip,
-                _ => subject && !clip,
-            }
-        });
+        let resolved = boolean::resolved(both, |windings| wanted(rule, windings));
         resolved.map_or_else(|| self.swept_with(other, rule), |islands| Self { islands })
     }
 
@@ -321,6 +314,16 @@ fn bounds_of<'a>(mut points: impl Iterator<Item = &'a GridPoint>) -> Option<Grid
         bounds.max = GridPoint::new(bounds.max.x.max(p.x), bounds.max.y.max(p.y));
     }
     Some(bounds)
+}
+
+/// Whether places with these windings belong to a boolean of two regions.
+fn wanted(rule: OverlayRule, windings: Windings) -> bool {
+    let (subject, clip) = (windings.subject != 0, windings.clip != 0);
+    match rule {
+        OverlayRule::Union => subject || clip,
+        OverlayRule::Intersect => subject && clip,
+        _ => subject && !clip,
+    }
 }
 
 fn engine_rule(fill: Fill) -> FillRule {
@@ -524,6 +527,41 @@ mod tests {
             }
         }
         assert!(without_sweep > 400, "only {without_sweep} of 800 without a sweep");
+    }
+
+    /// Layers between upright walls share rings, whole: as outlines, as holes, or as the hole of one that
+    /// the other fills.
+    #[test]
+    fn regions_with_rings_in_common_need_no_sweep() {
+        for seed in 0..40 {
+            let seed = f64::from(seed) * 0.7;
+            let turned = |mut ring: Ring| {
+                ring.reverse();
+                ring
+            };
+            let outer = wavy(0, 0, 100_000.0, 40, seed);
+            let shared = turned(wavy(40_000, 0, 20_000.0, 20, seed + 1.0));
+            let own = turned(wavy(-40_000, 0, 20_000.0, 20, seed + 2.0));
+            let plug = turned(own.clone());
+            let of = |rings: &[&Ring]| {
+                let rings: Vec<Ring> = rings.iter().map(|ring| (*ring).clone()).collect();
+                Region::from_grid_rings(&rings, Fill::Positive)
+            };
+            let one = of(&[&outer, &shared, &own]);
+            for other in [of(&[&outer, &shared]), of(&[&plug]), of(&[&outer]), one.clone()] {
+                for rule in [OverlayRule::Union, OverlayRule::Intersect, OverlayRule::Difference] {
+                    for (a, b) in [(&one, &other), (&other, &one)] {
+                        let subject = a.rings().map(|ring| (ring.as_slice(), Side::Subject));
+                        let clip = b.rings().map(|ring| (ring.as_slice(), Side::Clip));
+                        let resolved = boolean::resolved(subject.chain(clip), |windings| {
+                            wanted(rule, windings)
+                        });
+                        let resolved = resolved.expect("rings only coincide");
+                        assert_eq!(resolved, a.swept_with(b, rule).islands, "{seed} {rule:?}");
+                    }
+                }
+            }
+        }
     }
 
     #[test]

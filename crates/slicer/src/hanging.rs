@@ -9,6 +9,7 @@ use nalgebra::Point2;
 use crate::bead::Bead;
 use crate::chart::Chart;
 use crate::infill::clip::Sides;
+use crate::skins::SKIN_TOLERANCE_MM;
 use crate::toolpath::Overhang;
 
 /// A point of a line, its bead, and how the piece after it hangs over.
@@ -56,13 +57,15 @@ impl Below {
         let grown = |shares: f64, from: &Region| chart.outset(from, shares * width);
         let mut carries = Vec::new();
         let Some(below) = below else { return Self { carries } };
-        let bare = material.difference(below);
-        if bare.is_empty() {
+        // Thinned out like what is below: then upright walls are equal to the last bit.
+        let material = material.thinned(SKIN_TOLERANCE_MM);
+        if material == *below {
             return Self { carries };
         }
         // As far as the outline reaches beyond what is below, less half a width, reaches the bead.
         let most = grown(MOST, below);
-        if bare.difference(&most).is_empty() {
+        let bare = material.difference(&most);
+        if bare.is_empty() {
             return Self { carries };
         }
         carries.push(Ground::new(Overhang::Quarter, chart.inset(below, -QUARTER * width)));

@@ -173,7 +173,11 @@ pub fn columns(layers: &[Shade], params: &SupportParams) -> Vec<Column> {
         .par_iter()
         .zip(&needed)
         .map(|(layer, needed)| {
-            if needed.is_empty() { Region::default() } else { layer.material.outset(params.xy_gap) }
+            if needed.is_empty() {
+                Region::default()
+            } else {
+                layer.material.outset_coarsely(params.xy_gap)
+            }
         })
         .collect();
     let mut columns: Vec<Column> = (0..layers.len())
@@ -193,7 +197,11 @@ fn contacts(layers: &[Shade], params: &SupportParams) -> Vec<Region> {
     for layer in layers {
         // Over none of this may a column stand that has to reach the bed.
         let is_asked = params.on_bed_only && !layer.hanging.is_empty();
-        grounds.push(if is_asked { under.outset(params.xy_gap) } else { Region::default() });
+        grounds.push(if is_asked {
+            under.outset_coarsely(params.xy_gap)
+        } else {
+            Region::default()
+        });
         if params.on_bed_only {
             under = under.union(&layer.material).thinned(TOLERANCE_MM / 2.0);
         }
@@ -203,8 +211,8 @@ fn contacts(layers: &[Shade], params: &SupportParams) -> Vec<Region> {
         if k == 0 || hangs.is_empty() {
             return Region::default();
         }
-        let beside = layers[k - 1].material.outset(params.xy_gap).union(&grounds[k]);
-        let grown = hangs.outset(MARGIN_MM).difference(&beside);
+        let beside = layers[k - 1].material.outset_coarsely(params.xy_gap).union(&grounds[k]);
+        let grown = hangs.outset_coarsely(MARGIN_MM).difference(&beside);
         // Not on the other side of a thin wall.
         let touches = |island: &&Island| {
             !Region::from_island((*island).clone()).intersection(&hangs).is_empty()

@@ -76,12 +76,12 @@ fn windings_at_start(rings: &[Simple], index: usize) -> Windings {
     let mut left = Windings::default();
     for (other, around) in rings.iter().enumerate() {
         if other != index {
-            left.add(around.owner, around.windings_about(ring.points[0]));
+            left.add(around.weight, around.windings_about(ring.points[0]));
         }
     }
     // Nothing of the ring itself lies beyond its least point: that is its outside.
     if ring.turns_left_at_start() {
-        left.add(ring.owner, 1);
+        left.add(ring.weight, 1);
     }
     left
 }
@@ -94,7 +94,7 @@ fn bounds_kept(
     is_inside: impl Fn(Windings) -> bool,
 ) -> Option<bool> {
     let mut right = left;
-    right.add(ring.owner, -1);
+    right.add(ring.weight, -1);
     let is_left = is_inside(left);
     (is_left != is_inside(right)).then_some(is_left)
 }
@@ -120,8 +120,8 @@ fn cut(
     let ring = &rings[index];
     let mut left = start;
     for (i, (way, node)) in own.iter().enumerate() {
-        let owner = rings[crossings[*node].other(way).ring].owner;
-        left.add(owner, if way.to_the_right { -1 } else { 1 });
+        let met = rings[crossings[*node].other(way).ring].weight;
+        left.add(met, if way.to_the_right { -1 } else { 1 });
         let (next, next_node) = &own[(i + 1) % own.len()];
         if let Some(forwards) = bounds_kept(left, ring, is_inside) {
             let mut between = ring.points_between(way, next);

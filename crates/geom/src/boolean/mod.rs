@@ -32,16 +32,26 @@ pub(crate) struct Windings {
 }
 
 impl Windings {
-    pub(crate) fn add(&mut self, side: Side, winding: i32) {
-        match side {
-            Side::Subject => self.subject += winding,
-            Side::Clip => self.clip += winding,
+    /// Adds those of `other`, `times` over.
+    fn add(&mut self, other: Self, times: i32) {
+        self.subject += times * other.subject;
+        self.clip += times * other.clip;
+    }
+}
+
+impl Side {
+    /// What a ring of this side adds to the places that it winds round once.
+    fn weight(self) -> Windings {
+        match self {
+            Self::Subject => Windings { subject: 1, clip: 0 },
+            Self::Clip => Windings { subject: 0, clip: 1 },
         }
     }
 }
 
 /// Returns the islands of all places whose windings `is_inside` accepts; `None` when rings touch
-/// or overlap, others or themselves, or when kept places meet in a point.
+/// or overlap, others or themselves, or when kept places meet in a point. Rings that are equal, as
+/// those of upright walls in neighbouring layers, count as one.
 ///
 /// The result is the overlay engine's up to the rounding of crossings: outer rings in the order of their least
 /// points (by x, then y), so are their holes, and no point lies on a straight line between its
@@ -52,17 +62,18 @@ pub(crate) fn resolved<'a>(
 ) -> Option<Vec<Island>> {
     let mut placed = Vec::new();
     for (ring, side) in rings {
-        if let Some(ring) = Simple::new(ring, side)? {
+        if let Some(ring) = Simple::new(ring, side.weight())? {
             placed.push(ring);
         }
     }
+    let placed = simple::merged(placed);
     let crossings = crossing::crossings(&placed)?;
     if crossings.is_empty() {
         return Some(nesting::islands(&placed, is_inside));
     }
     let mut resolved = Vec::new();
     for ring in boundary::uncrossed(&placed, &crossings, is_inside)? {
-        if let Some(ring) = Simple::new(&ring, Side::Subject)? {
+        if let Some(ring) = Simple::new(&ring, Side::Subject.weight())? {
             resolved.push(ring);
         }
     }

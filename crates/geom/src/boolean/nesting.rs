@@ -27,10 +27,10 @@ pub(super) fn islands(rings: &[Simple], is_inside: impl Fn(Windings) -> bool) ->
             .collect();
         let mut windings = Windings::default();
         for &other in &around {
-            windings.add(rings[other].owner, rings[other].winding());
+            windings.add(rings[other].weight, rings[other].winding());
         }
         let outside = is_inside(windings);
-        windings.add(ring.owner, ring.winding());
+        windings.add(ring.weight, ring.winding());
         let inside = is_inside(windings);
         if inside != outside {
             kept.push(Kept { ring: index, is_outer: inside, around });

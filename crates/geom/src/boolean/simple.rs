@@ -3,14 +3,15 @@
 use crate::grid::GridPoint;
 use crate::region::{Ring, signed_area};
 
-use super::Side;
+use super::Windings;
 use super::crossing::Passage;
 
 /// A ring without repeated points and straight corners.
 pub(super) struct Simple {
     /// From the least point on.
     pub(super) points: Ring,
-    pub(super) owner: Side,
+    /// What it adds to the places that it winds round once.
+    pub(super) weight: Windings,
     pub(super) bounds: Bounds,
     /// mm², signed.
     pub(super) area: f64,
@@ -18,7 +19,7 @@ pub(super) struct Simple {
 
 impl Simple {
     /// `Some(None)` for a ring that encloses nothing, `None` for one that turns back on itself.
-    pub(super) fn new(ring: &[GridPoint], side: Side) -> Option<Option<Self>> {
+    pub(super) fn new(ring: &[GridPoint], weight: Windings) -> Option<Option<Self>> {
         let mut points: Ring = Vec::with_capacity(ring.len());
         let Some(least) = (0..ring.len()).min_by_key(|&i| (ring[i].x, ring[i].y)) else {
             return Some(None);
@@ -37,7 +38,7 @@ impl Simple {
         }
         let bounds = Bounds::of(&points);
         let area = signed_area(&points);
-        Some(Some(Self { points, owner: side, bounds, area }))
+        Some(Some(Self { points, weight, bounds, area }))
     }
 
     pub(super) fn winding(&self) -> i32 {
@@ -48,6 +49,11 @@ impl Simple {
     pub(super) fn side(&self, i: usize) -> (GridPoint, GridPoint) {
         let next = if i + 1 == self.points.len() { 0 } else { i + 1 };
         (self.points[i], self.points[next])
+    }
+
+    /// Whether it is the other ring the other way round.
+    fn reverses(&self, other: &Self) -> bool {
+        self.points[1..].iter().rev().eq(&other.points[1..])
     }
 
     /// Whether the ring turns left in its least point.
@@ -95,6 +101,34 @@ impl Simple {
         }
         inside
     }
+}
+
+/// Returns the rings with those that are equal, this way or the other way round, in one.
+pub(super) fn merged(mut rings: Vec<Simple>) -> Vec<Simple> {
+    let mut order: Vec<u32> = (0..rings.len() as u32).collect();
+    let place = |ring: &Simple| (ring.points[0].x, ring.points[0].y, ring.points.len());
+    order.sort_unstable_by_key(|&k| (place(&rings[k as usize]), k));
+    let mut is_any = false;
+    for pair in order.windows(2) {
+        let [one, other] = [pair[0], pair[1]].map(|k| k as usize);
+        if place(&rings[one]) != place(&rings[other]) {
+            continue;
+        }
+        let times =
+            match (rings[one].points == rings[other].points, rings[one].reverses(&rings[other])) {
+                (true, _) => 1,
+                (_, true) => -1,
+                _ => continue,
+            };
+        // The last of them speaks for all.
+        let weight = std::mem::take(&mut rings[one].weight);
+        rings[other].weight.add(weight, times);
+        is_any = true;
+    }
+    if is_any {
+        rings.retain(|ring| ring.weight != Windings::default());
+    }
+    rings
 }
 
 /// Appends a point that differs from the last; one straight behind the last two replaces the last.

@@ -20,7 +20,7 @@
 
 use geom::grid::{GridPoint, STEPS_PER_MM, mm, snap};
 use geom::offset::{
-    ARC_TOLERANCE_MM, LEAST_SINE, LONGEST_MITER, MovedSides, OPENING_TOLERANCE_MM, lasting_rings,
+    ARC_TOLERANCE_MM, COARSE_TOLERANCE_MM, LEAST_SINE, LONGEST_MITER, MovedSides, lasting_rings,
     vanishes,
 };
 use geom::polyline::{distance_to_segment, share_nearest};
@@ -52,7 +52,7 @@ impl Chart {
 
     /// Like [`outset`](Self::outset), with convex corners kept sharp as long as they reach no
     /// farther than [`LONGEST_MITER`] times the distance, and curves to within
-    /// [`OPENING_TOLERANCE_MM`].
+    /// [`COARSE_TOLERANCE_MM`].
     #[must_use]
     pub fn outset_sharp(&self, region: &Region, distance: f64) -> Region {
         match self {
@@ -62,7 +62,7 @@ impl Chart {
     }
 
     /// Returns the part of the region that a disc of `radius` (mm) inside it can sweep, to within
-    /// [`OPENING_TOLERANCE_MM`].
+    /// [`COARSE_TOLERANCE_MM`].
     #[must_use]
     pub fn opened(&self, region: &Region, radius: f64) -> Region {
         match self {
@@ -170,9 +170,9 @@ struct Curves {
 
 const EXACT: Curves = Curves { tolerance: ARC_TOLERANCE_MM, longest_miter: 0.0 };
 
-const COARSE: Curves = Curves { tolerance: OPENING_TOLERANCE_MM, longest_miter: 0.0 };
+const COARSE: Curves = Curves { tolerance: COARSE_TOLERANCE_MM, longest_miter: 0.0 };
 
-const SHARP: Curves = Curves { tolerance: OPENING_TOLERANCE_MM, longest_miter: LONGEST_MITER };
+const SHARP: Curves = Curves { tolerance: COARSE_TOLERANCE_MM, longest_miter: LONGEST_MITER };
 
 /// Points nearer to the axis than this, mm, have no azimuth to speak of and are moved that far out.
 /// A grid step: what depends on it is as small.

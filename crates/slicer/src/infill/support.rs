@@ -59,11 +59,11 @@ impl Support<'_> {
     /// more ado.
     fn body(&self, column: &Region, beside: &Region, body: &Region, lines: &mut Vec<FillLine>) {
         let (bead, role, params) = (self.bead, Role::SupportMaterial, self.params);
-        let rim = column.inset(bead.width / 2.0);
+        let rim = column.inset_coarsely(bead.width / 2.0);
         if params.sheath {
             self.sheath(&rim, body, lines);
         }
-        let room = if params.sheath { rim.inset(bead.spacing()) } else { rim };
+        let room = if params.sheath { rim.inset_coarsely(bead.spacing()) } else { rim };
         let core = room.intersection(body);
         if core.is_empty() {
             return;
