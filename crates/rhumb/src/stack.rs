@@ -7,6 +7,7 @@
 use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use geom::region::Region;
 use mesh::topology::Solid;
@@ -17,7 +18,7 @@ use slicer::chart::{Chart, carried, carried_point, carried_to_side};
 use slicer::compensation::{CompensationParams, compensated};
 use slicer::infill::Pattern;
 use slicer::infill::lightning::{Branches, Stratum, grow};
-use slicer::layer::{Filled, Parted, PathParams};
+use slicer::layer::{Filled, Parted, PathParams, Pieces};
 use slicer::level::Level;
 use slicer::lift::Lift;
 use slicer::polyhole::{Bore, PolyholeParams, bores, with_polyholes};
@@ -49,6 +50,8 @@ pub(crate) struct Stack<'a> {
     columns: &'a [Column],
     /// The lines of sparse infill of the layers printed, where they are found for all together.
     branches: Vec<Branches>,
+    /// What layers were taken apart into for that, of the lowest ones printed: they are filled first.
+    kept: Vec<Mutex<Option<Pieces>>>,
     /// Sections from `first` on.
     sections: VecDeque<Cut>,
     first: usize,
@@ -66,6 +69,10 @@ struct Cut {
     /// Whether the section of the layer below is the same to the last bit, as between upright walls.
     repeats: bool,
 }
+
+/// How much is kept of what layers were taken apart into, bytes: that of a hundred layers of a fine model.
+/// Layers beyond that are taken apart once more.
+const KEPT_BYTES: usize = 12 << 20;
 
 /// Wedges on the floor narrower than this share of the least width of a bead that is printed are left to
 /// the layer above: so near that width, only bits and pieces of a bead would be laid.
@@ -87,8 +94,8 @@ impl<'a> Stack<'a> {
         let first = stage.printed.start.saturating_sub(skins.bottom_layers.max(1));
         let stair = below.and_then(|below| below.stair(&stage.levels[stage.printed.start]));
         let sections = VecDeque::new();
-        let branches = Vec::new();
-        Self { solid, cutter, stage, stair, job, columns: &[], branches, sections, first }
+        let (branches, kept) = (Vec::new(), Vec::new());
+        Self { solid, cutter, stage, stair, job, columns: &[], branches, kept, sections, first }
     }
 
     /// Stands on these supports, of which there is one for every layer printed.
@@ -107,21 +114,33 @@ impl<'a> Stack<'a> {
         if how.pattern != Pattern::Lightning || how.density <= 0.0 || params.skins.all_solid {
             return Ok(());
         }
-        let Self { solid, stage, stair, job, first, .. } = *self;
+        let Self { solid, stage, stair, job, first, columns, .. } = *self;
         let Range { start, end } = stage.printed;
-        let mut ahead = Self { stair, first, ..Self::new(solid, stage, None, job) };
+        let mut ahead = Self { stair, first, columns, ..Self::new(solid, stage, None, job) };
         let mut cores: Vec<(Region, f64)> = Vec::with_capacity(end - start);
+        let mut room = KEPT_BYTES;
         for from in stage.printed.clone().step_by(WINDOW) {
             interrupt.check()?;
             let window = from..(from + WINDOW).min(end);
             ahead.reach(&window, |_| {});
             let core = |run: Range<usize>| {
-                let core = |(k, layer): (usize, Option<Parted<'_>>)| {
-                    layer.map(|layer| layer.core(&ahead.params(k))).unwrap_or_default()
+                let core = |(k, layer): (usize, &Option<Parted<'_>>)| {
+                    layer.as_ref().map(|layer| layer.core(&ahead.params(k))).unwrap_or_default()
                 };
-                run.clone().zip(ahead.part_run(run)).map(core).collect::<Vec<_>>()
+                let mut layers = ahead.part_run(run.clone());
+                let cores = run.zip(&layers).map(core).collect::<Vec<_>>();
+                // The others of a run are as the first.
+                (cores, layers.swap_remove(0).map(Parted::into_pieces))
             };
-            cores.par_extend(ahead.runs(window).into_par_iter().flat_map_iter(core));
+            let runs: Vec<_> = ahead.runs(window).into_par_iter().map(core).collect();
+            for (run, pieces) in runs {
+                let size = pieces.as_ref().map_or(0, Pieces::size);
+                let pieces = pieces.filter(|_| size <= room);
+                room = if pieces.is_some() { room - size } else { 0 };
+                self.kept.push(Mutex::new(pieces));
+                self.kept.extend(run[1..].iter().map(|_| Mutex::default()));
+                cores.extend(run);
+            }
         }
         let strata = (0..cores.len()).into_par_iter().map(|i| {
             let (core, above) = (&cores[i].0, cores.get(i + 1));
@@ -427,6 +446,9 @@ impl<'a> Stack<'a> {
     fn part(&self, k: usize) -> Option<Parted<'_>> {
         let lift = self.lift(k);
         let support = self.column(k).filter(|column| !column.is_empty());
+        if let Some(pieces) = self.kept_of(k) {
+            return Some(self.branched(Parted::of(&lift, pieces).on(support), k));
+        }
         let material = self.material(k, &lift);
         if material.is_empty() && support.is_none() {
             return None;
@@ -442,6 +464,12 @@ impl<'a> Stack<'a> {
         };
         let parted = Parted::new(&lift, &material, &neighbours, &self.params(k)).on(support);
         Some(self.branched(parted, k))
+    }
+
+    /// What layer `k` was taken apart into before; it is wanted once.
+    fn kept_of(&self, k: usize) -> Option<Pieces> {
+        let kept = self.kept.get(k.checked_sub(self.stage.printed.start)?)?;
+        kept.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// What of layer `k` is support.

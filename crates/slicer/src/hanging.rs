@@ -3,6 +3,8 @@
 //! Of a bead that runs `d` mm outside of what is below, the share `½ + d/width` hangs over. Lines
 //! are cut where that share passes a quarter, a half, three quarters and one.
 
+use std::sync::OnceLock;
+
 use geom::region::Region;
 use nalgebra::Point2;
 
@@ -27,14 +29,13 @@ pub(crate) struct Below {
 struct Ground {
     degree: Overhang,
     region: Region,
-    /// Its sides; none where it is empty.
-    sides: Option<Sides>,
+    /// Its sides, sorted when they are wanted; none where it is empty.
+    sides: OnceLock<Option<Sides>>,
 }
 
 impl Ground {
     fn new(degree: Overhang, region: Region) -> Self {
-        let sides = Sides::of(&region);
-        Self { degree, region, sides }
+        Self { degree, region, sides: OnceLock::new() }
     }
 }
 
@@ -79,6 +80,11 @@ impl Below {
         Self { carries }
     }
 
+    /// Returns how many points its outlines have.
+    pub(crate) fn point_count(&self) -> usize {
+        self.carries.iter().map(|ground| ground.region.point_count()).sum()
+    }
+
     /// Returns whether anything can hang over.
     pub(crate) fn is_open(&self) -> bool {
         !self.carries.is_empty()
@@ -101,7 +107,7 @@ fn beyond(line: &[Hanging], ground: &Ground) -> Vec<Hanging> {
     let points: Vec<Point2<f64>> = line.iter().map(|(at, ..)| *at).collect();
     let Some(first) = points.first() else { return Vec::new() };
     let mut inside = region.contains(first);
-    let crossings = match sides {
+    let crossings = match sides.get_or_init(|| Sides::of(region)) {
         Some(sides) => sides.crossings_of_ring(&points),
         None => Vec::new(),
     };

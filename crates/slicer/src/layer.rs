@@ -122,16 +122,32 @@ pub fn fill_layer(
 #[derive(Clone)]
 pub struct Parted<'a> {
     lift: Lift<'a>,
-    material: Region,
-    hanging: Below,
-    islands: Vec<PartedIsland>,
+    pieces: Pieces,
     support: Option<&'a Column>,
-    floating: Vec<Floating>,
     /// Sparse infill as thick as several layers, and the family that it is part of.
     thick: Option<Thick<'a>>,
     /// The lines of sparse infill that are known beforehand, in the chart.
     branches: &'a [Vec<Point2<f64>>],
+}
+
+/// What a layer was taken apart into, without its place: to be put by, and filled later.
+#[derive(Clone)]
+pub struct Pieces {
+    material: Region,
+    hanging: Below,
+    islands: Vec<PartedIsland>,
+    floating: Vec<Floating>,
     is_vase: bool,
+}
+
+impl Pieces {
+    /// Returns about how much memory they take, bytes.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        let regions = self.material.point_count() + self.hanging.point_count();
+        let islands = self.islands.iter().map(PartedIsland::size).sum::<usize>();
+        size_of::<GridPoint>() * regions + islands
+    }
 }
 
 /// Sparse infill as thick as several layers.
@@ -155,6 +171,18 @@ struct PartedIsland {
     bridges: Vec<Bridge>,
 }
 
+impl PartedIsland {
+    fn size(&self) -> usize {
+        let Skins { top, solid, sparse, unsupported } = &self.skins;
+        let Walls { groups, interior, thin } = &self.walls;
+        let regions = [&self.outline, &self.thin, top, solid, sparse, unsupported, interior];
+        let regions = regions.into_iter().chain(thin.iter().map(|place| &place.region));
+        let on_walls: usize = groups.iter().flatten().map(|wall| wall.points.len()).sum();
+        size_of::<GridPoint>() * regions.map(Region::point_count).sum::<usize>()
+            + size_of::<(Point2<f64>, Bead)>() * on_walls
+    }
+}
+
 impl<'a> Parted<'a> {
     /// Takes the material of a layer apart; regions are in its chart.
     #[must_use]
@@ -172,17 +200,26 @@ impl<'a> Parted<'a> {
         let around = Around::of(neighbours);
         let islands = material.islands().par_iter();
         let islands = islands.map(|island| part(island, &hanging, &around, &frame, params));
-        Self {
-            lift: *lift,
+        let pieces = Pieces {
             islands: if is_vase { Vec::new() } else { islands.collect() },
             floating: if is_vase { Vec::new() } else { floating(material, neighbours, &frame) },
             material: material.clone(),
             hanging,
-            support: None,
-            thick: None,
-            branches: &[],
             is_vase,
-        }
+        };
+        Self::of(lift, pieces)
+    }
+
+    /// Puts pieces in the place that they were taken from.
+    #[must_use]
+    pub fn of(lift: &Lift<'a>, pieces: Pieces) -> Self {
+        Self { lift: *lift, pieces, support: None, thick: None, branches: &[] }
+    }
+
+    /// Returns the pieces alone.
+    #[must_use]
+    pub fn into_pieces(self) -> Pieces {
+        self.pieces
     }
 
     /// Returns the same taken apart again on another plane: what a layer is whose section, thickness
@@ -195,9 +232,10 @@ impl<'a> Parted<'a> {
             let limits = lift.floor.is_some() || lift.ceiling.is_some() || lift.stair.is_some();
             lift.level.index > 0 && lift.surface.form().is_flat() && !limits && lift.below.is_none()
         };
-        let plain = self.thick.is_none() && self.floating.is_empty() && !self.is_vase;
+        let Pieces { floating, is_vase, .. } = &self.pieces;
+        let plain = self.thick.is_none() && floating.is_empty() && !is_vase;
         let fits = same && plain && is_everywhere(&self.lift) && is_everywhere(lift);
-        fits.then(|| Self { lift: *lift, support: None, branches: &[], ..self.clone() })
+        fits.then(|| Self::of(lift, self.pieces.clone()))
     }
 
     /// Adds the supports of the layer.
@@ -226,7 +264,8 @@ impl<'a> Parted<'a> {
     /// Returns what sparse infill takes.
     #[must_use]
     pub fn sparse(&self) -> Region {
-        let rings = self.islands.iter().flat_map(|island| island.skins.sparse.rings().cloned());
+        let rings =
+            self.pieces.islands.iter().flat_map(|island| island.skins.sparse.rings().cloned());
         let rings: Vec<Ring> = rings.collect();
         Region::from_grid_rings(&rings, Fill::Positive)
     }
@@ -236,7 +275,7 @@ impl<'a> Parted<'a> {
     pub fn leave_out(&mut self, region: &Region, params: &PathParams) {
         let Frame { chart, thickness, .. } = Frame::of(&self.lift);
         let spacing = Bead { width: params.infill.width, thickness }.spacing();
-        for island in &mut self.islands {
+        for island in &mut self.pieces.islands {
             let left = island.skins.sparse.difference(region);
             island.skins.sparse = chart.opened(&left, spacing);
         }
@@ -253,15 +292,18 @@ impl<'a> Parted<'a> {
     #[must_use]
     pub fn fill(self, params: &PathParams) -> Filled {
         let frame = Frame::of(&self.lift);
-        let material = &self.material;
-        if self.is_vase {
+        let material = &self.pieces.material;
+        if self.pieces.is_vase {
             return vase_layer(material, &frame, params);
         }
         let level = &self.lift.level;
         let islands: Vec<(IslandPaths, LostArea)> = self
+            .pieces
             .islands
             .par_iter()
-            .map(|island| fill_island(island, &self.hanging, self.thick.as_ref(), &frame, params))
+            .map(|island| {
+                fill_island(island, &self.pieces.hanging, self.thick.as_ref(), &frame, params)
+            })
             .collect();
         let mut filled = Filled {
             paths: LayerPaths {
@@ -270,7 +312,7 @@ impl<'a> Parted<'a> {
                 thickness: frame.thickness,
                 ..LayerPaths::default()
             },
-            floating: self.floating,
+            floating: self.pieces.floating,
             ..Filled::default()
         };
         for (paths, lost) in islands {
@@ -283,7 +325,7 @@ impl<'a> Parted<'a> {
         for line in self.branches.iter().filter(long) {
             // A branch lies within one island.
             let Some(first) = line.first() else { continue };
-            let home = self.islands.iter().position(|island| island.outline.contains(first));
+            let home = self.pieces.islands.iter().position(|island| island.outline.contains(first));
             if let Some(paths) = home.and_then(|home| filled.paths.islands.get_mut(home)) {
                 paths.fills.push(frame.line(line, bead, Role::InternalInfill, false));
             }

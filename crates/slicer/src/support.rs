@@ -18,6 +18,7 @@ use rayon::prelude::*;
 
 use crate::bridge::spanned;
 use crate::chart::Chart;
+use crate::skins::SKIN_TOLERANCE_MM;
 
 /// How the lines of a column run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,17 +102,17 @@ pub fn hanging(
     thickness: f64,
     params: &SupportParams,
 ) -> Region {
-    let beyond = material.difference(below);
-    if beyond.area() <= LEAST_MM2 && carries_all(below, material) {
+    // Thinned out like what is below: then upright walls are equal to the last bit.
+    if material.thinned(SKIN_TOLERANCE_MM) == *below {
         return Region::default();
     }
     let reach = params.carried_reach(thickness);
-    let bare = chart.opened(&material.difference(&chart.outset(below, reach)), NOISE_MM / 2.0);
-    let floats =
-        |island: &&Island| Region::from_island((*island).clone()).intersection(below).is_empty();
-    let floating = material.filtered(floats);
+    let beyond_reach = material.difference(&chart.outset(below, reach));
+    let floating = material.filtered(|island| !is_carried(island, below));
+    let bare = chart.opened(&beyond_reach, NOISE_MM / 2.0);
     let mut hangs = Region::default();
     if !bare.is_empty() {
+        let beyond = material.difference(below);
         // Up to what carries it, so that the steps of a slope leave no stripes between them.
         hangs = chart.outset(&bare, reach + NOISE_MM).intersection(&beyond);
         hangs = hangs.without_small_islands(LEAST_MM2);
@@ -126,12 +127,10 @@ pub fn hanging(
     if floating.is_empty() { hangs } else { hangs.union(&floating) }
 }
 
-/// Whether every island of a layer has something below it.
-fn carries_all(below: &Region, material: &Region) -> bool {
-    material.islands().iter().all(|island| {
-        island.iter().flatten().any(|&p| below.contains(&mm(p)))
-            || !Region::from_island(island.clone()).intersection(below).is_empty()
-    })
+/// Whether an island of a layer has something below it.
+fn is_carried(island: &Island, below: &Region) -> bool {
+    island.iter().flatten().any(|&p| below.contains(&mm(p)))
+        || !Region::from_island(island.clone()).intersection(below).is_empty()
 }
 
 /// One layer as it is seen along the axis.
