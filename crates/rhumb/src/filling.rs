@@ -11,6 +11,7 @@ use crate::groups::{stacks, surround, together};
 use crate::interrupt::Interrupt;
 use crate::pipeline::Parts;
 use crate::settings::Job;
+use crate::shelf::{Shelf, Use};
 use crate::stack::Stack;
 use crate::stages::Stage;
 
@@ -34,6 +35,7 @@ pub(crate) struct Batch {
 pub(crate) struct Filling<'a> {
     parts: &'a Parts<'a>,
     stages: &'a [Stage],
+    shelves: &'a [Shelf],
     columns: &'a [Vec<Column>],
     job: &'a Job,
     stage: usize,
@@ -45,16 +47,18 @@ pub(crate) struct Filling<'a> {
 }
 
 impl<'a> Filling<'a> {
-    /// Nothing is filled yet; supports stand in `columns`, by stage and layer.
+    /// Nothing is filled yet; supports stand in `columns`, by stage and layer, and sections that are known
+    /// already in `shelves`, by stage.
     pub(crate) fn new(
         parts: &'a Parts<'a>,
-        stages: &'a [Stage],
+        (stages, shelves): (&'a [Stage], &'a [Shelf]),
         columns: &'a [Vec<Column>],
         job: &'a Job,
         interrupt: &'a Interrupt,
     ) -> Self {
         let (next, stacks, is_first) = (None, Vec::new(), true);
-        Self { parts, stages, columns, job, stage: 0, next, stacks, is_first, interrupt }
+        let stage = 0;
+        Self { parts, stages, shelves, columns, job, stage, next, stacks, is_first, interrupt }
     }
 
     fn below(&self) -> Option<&'a Stage> {
@@ -65,6 +69,9 @@ impl<'a> Filling<'a> {
         self.stacks = stacks(self.parts.groups, self.parts.all, stage, self.below(), self.job);
         if let Some(first) = self.stacks.first_mut() {
             first.stand_on(&self.columns[self.stage]);
+        }
+        if let ([all], true) = (&mut self.stacks[..], self.parts.groups.is_empty()) {
+            all.share(Use::Empty(&self.shelves[self.stage]));
         }
         for stack in &mut self.stacks {
             stack.grow(self.interrupt)?;

@@ -63,6 +63,7 @@ pub mod progress;
 pub mod ranges;
 pub mod report;
 pub mod settings;
+mod shelf;
 mod stack;
 pub mod stages;
 pub mod stopwatch;

@@ -41,6 +41,7 @@ use crate::program_text;
 use crate::progress::Progress;
 use crate::report::{Timings, Warning};
 use crate::settings::{Job, Settings};
+use crate::shelf::Shelf;
 use crate::stages::{LayerKind, Stage, stages};
 use crate::stopwatch::Stopwatch;
 use crate::supports::supports;
@@ -338,7 +339,8 @@ fn layers(
     watch: &mut Watch<'_>,
 ) -> Result<Printed, Failure> {
     let printed = Printed::default();
-    let columns = supports(parts.all, stages, job, watch)?;
+    let shelves: Vec<Shelf> = stages.iter().map(|stage| Shelf::of(stage.levels.len())).collect();
+    let columns = supports(parts.all, (stages, &shelves), job, watch)?;
     let mut planner = Planner::new(&job.printer, job.plan);
     if job.tells_progress {
         planner = planner.telling_time();
@@ -353,7 +355,7 @@ fn layers(
     watch.progress.stage("slice", count as u64);
     let progress = &mut *watch.progress;
     let mut printing = Printing { stages, job, settings, planner, text, progress, printed };
-    let mut filling = Filling::new(parts, stages, &columns, job, watch.interrupt);
+    let mut filling = Filling::new(parts, (stages, &shelves), &columns, job, watch.interrupt);
     let mut filled = filling.next().transpose()?;
     while let Some(batch) = filled {
         watch.interrupt.check()?;

@@ -31,6 +31,7 @@ use crate::failure::Failure;
 use crate::filling::WINDOW;
 use crate::interrupt::Interrupt;
 use crate::settings::Job;
+use crate::shelf::Use;
 use crate::stages::Stage;
 
 /// How closely layers as seen along the axis follow their outlines, mm: supports keep more than ten
@@ -52,6 +53,8 @@ pub(crate) struct Stack<'a> {
     branches: Vec<Branches>,
     /// What layers were taken apart into for that, of the lowest ones printed: they are filled first.
     kept: Vec<Mutex<Option<Pieces>>>,
+    /// Where sections that others want, too, are put by.
+    shelf: Use<'a>,
     /// Sections from `first` on.
     sections: VecDeque<Cut>,
     first: usize,
@@ -94,8 +97,14 @@ impl<'a> Stack<'a> {
         let first = stage.printed.start.saturating_sub(skins.bottom_layers.max(1));
         let stair = below.and_then(|below| below.stair(&stage.levels[stage.printed.start]));
         let sections = VecDeque::new();
-        let (branches, kept) = (Vec::new(), Vec::new());
-        Self { solid, cutter, stage, stair, job, columns: &[], branches, kept, sections, first }
+        let (branches, kept, shelf) = (Vec::new(), Vec::new(), Use::Leave);
+        let columns = &[];
+        Self { solid, cutter, stage, stair, job, columns, branches, kept, shelf, sections, first }
+    }
+
+    /// Shares sections with others of the same solid, stage and job.
+    pub(crate) fn share(&mut self, shelf: Use<'a>) {
+        self.shelf = shelf;
     }
 
     /// Stands on these supports, of which there is one for every layer printed.
@@ -114,9 +123,10 @@ impl<'a> Stack<'a> {
         if how.pattern != Pattern::Lightning || how.density <= 0.0 || params.skins.all_solid {
             return Ok(());
         }
-        let Self { solid, stage, stair, job, first, columns, .. } = *self;
+        let Self { solid, stage, stair, job, first, columns, shelf, .. } = *self;
+        let shelf = if let Use::Empty(shelf) = shelf { Use::PutBy(shelf) } else { shelf };
         let Range { start, end } = stage.printed;
-        let mut ahead = Self { stair, first, columns, ..Self::new(solid, stage, None, job) };
+        let mut ahead = Self { stair, first, columns, shelf, ..Self::new(solid, stage, None, job) };
         let mut cores: Vec<(Region, f64)> = Vec::with_capacity(end - start);
         let mut room = KEPT_BYTES;
         for from in stage.printed.clone().step_by(WINDOW) {
@@ -196,18 +206,7 @@ impl<'a> Stack<'a> {
         let cut: Vec<Cut> = (have..want)
             .into_par_iter()
             .map(|k| {
-                let mut section = self.section(k);
-                let level = &self.stage.levels[k];
-                let is_first = level.index == 0 && self.stage.floor.is_none();
-                let chart = self.stage.surface.chart(level.middle());
-                let how = &self.job.paths.compensation;
-                if let Some(polyholes) = &how.polyholes {
-                    section.region = self.with_polyholes(section.region, k, &chart, polyholes);
-                }
-                if *how != CompensationParams::default() {
-                    section.region = compensated(section.region, is_first, &chart, how);
-                }
-                let cover = section.region.thinned(SKIN_TOLERANCE_MM);
+                let (section, cover) = self.shelf.cut(k, || self.cut(k));
                 let narrow = self.narrow(&cover, k);
                 Cut { section, cover, narrow, bare: None, repeats: false }
             })
@@ -224,6 +223,23 @@ impl<'a> Stack<'a> {
                 self.sections[i].bare = Some(bare);
             }
         }
+    }
+
+    /// The section of layer `k` as it is to be printed, and a thinned-out copy.
+    fn cut(&self, k: usize) -> (Section, Region) {
+        let mut section = self.section(k);
+        let level = &self.stage.levels[k];
+        let is_first = level.index == 0 && self.stage.floor.is_none();
+        let chart = self.stage.surface.chart(level.middle());
+        let how = &self.job.paths.compensation;
+        if let Some(polyholes) = &how.polyholes {
+            section.region = self.with_polyholes(section.region, k, &chart, polyholes);
+        }
+        if *how != CompensationParams::default() {
+            section.region = compensated(section.region, is_first, &chart, how);
+        }
+        let cover = section.region.thinned(SKIN_TOLERANCE_MM);
+        (section, cover)
     }
 
     /// A section of layer `k` whose upright bores, those that a layer above or below has too, are polygons.

@@ -8,17 +8,19 @@ use crate::failure::Failure;
 use crate::filling::WINDOW;
 use crate::pipeline::Watch;
 use crate::settings::Job;
+use crate::shelf::{Shelf, Use};
 use crate::stack::Stack;
 use crate::stages::Stage;
 
-/// Returns the supports of every layer printed, by stage; nothing where none are wanted.
+/// Returns the supports of every layer printed, by stage; nothing where none are wanted. Sections are put
+/// by for who fills the layers.
 ///
 /// # Errors
 ///
 /// When the user interrupts.
 pub(crate) fn supports(
     solid: &Solid,
-    stages: &[Stage],
+    (stages, shelves): (&[Stage], &[Shelf]),
     job: &Job,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Vec<Column>>, Failure> {
@@ -31,6 +33,7 @@ pub(crate) fn supports(
     for (index, stage) in stages.iter().enumerate() {
         let below = index.checked_sub(1).map(|below| &stages[below]);
         let mut stack = Stack::new(solid, stage, below, job);
+        stack.share(Use::PutBy(&shelves[index]));
         for start in stage.printed.clone().step_by(WINDOW) {
             watch.interrupt.check()?;
             let window = start..(start + WINDOW).min(stage.printed.end);
