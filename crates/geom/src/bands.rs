@@ -1,14 +1,13 @@
 //! The sides of a region by height, for areas that are asked about many places.
 //!
 //! The sides of all rings are sorted into horizontal bands, each into all that it runs through: what a
-//! point or a segment can meet lies in its own bands. Answers are those of
-//! [`Region::contains`](crate::region::Region::contains) and
-//! [`Region::contains_segment`](crate::region::Region::contains_segment), which look at every side.
+//! point or a segment can meet lies in its own bands. Answers are those of the methods of the same names
+//! of [`Region`], which look at every side.
 
 use nalgebra::Point2;
 
 use crate::grid::mm;
-use crate::region::{Region, ring_sides, segments_cross};
+use crate::region::{Part, Region, parts, ring_sides, segments_cross};
 
 /// A region whose sides are sorted by height.
 #[derive(Debug, Clone, Default)]
@@ -107,6 +106,23 @@ impl Bands {
         let sides = self.met_by(&[*a, *b]).flat_map(|band| self.in_band(band));
         !sides.filter(may_meet).any(|[c, d]| segments_cross(a, b, c, d))
     }
+
+    /// Returns the segment from `a` to `b` (mm) cut where it meets a ring, in order.
+    #[must_use]
+    pub fn parts(&self, a: &Point2<f64>, b: &Point2<f64>) -> Vec<Part> {
+        if self.begins.is_empty() {
+            return vec![Part { from: *a, to: *b, inside: false }];
+        }
+        let met = self.met_by(&[*a, *b]);
+        let first = *met.start();
+        let sides = met.flat_map(|band| {
+            // Each in the first band that it shares with the segment, and only there.
+            let is_new =
+                move |side: &&[Point2<f64>; 2]| band == first.max(*self.met_by(side).start());
+            self.in_band(band).iter().filter(is_new).copied()
+        });
+        parts(a, b, sides, |p| self.contains(p))
+    }
 }
 
 #[cfg(test)]
@@ -165,6 +181,7 @@ mod tests {
                 let expected = region.contains_segment(&a, &b);
                 assert_eq!(bands.contains_segment(&a, &b), expected, "{a} {b}");
                 inside += u32::from(expected);
+                assert_eq!(bands.parts(&a, &b), region.parts(&a, &b), "{a} {b}");
             }
         }
         assert!((500..9000).contains(&inside), "{inside}");

@@ -243,30 +243,8 @@ impl Region {
     /// Returns the segment from `a` to `b` (mm) cut where it meets a ring, in order.
     #[must_use]
     pub fn parts(&self, a: &Point2<f64>, b: &Point2<f64>) -> Vec<Part> {
-        let along = b - a;
-        let mut cuts: Vec<f64> = Vec::new();
-        for (c, d) in self.rings().flat_map(|ring| ring_sides(ring)) {
-            let (c, d) = (mm(c), mm(d));
-            let (c_side, d_side) = (along.perp(&(c - a)), along.perp(&(d - a)));
-            if (c_side > 0.0) != (d_side > 0.0) {
-                let meeting = c + (d - c) * (c_side / (c_side - d_side));
-                cuts.push((meeting - a).dot(&along) / along.norm_squared());
-            }
-        }
-        cuts.retain(|share| 0.0 < *share && *share < 1.0);
-        cuts.sort_unstable_by(f64::total_cmp);
-        let points: Vec<Point2<f64>> = std::iter::once(*a)
-            .chain(cuts.iter().map(|share| a + along * *share))
-            .chain([*b])
-            .collect();
-        points
-            .windows(2)
-            .map(|ends| Part {
-                from: ends[0],
-                to: ends[1],
-                inside: self.contains(&nalgebra::center(&ends[0], &ends[1])),
-            })
-            .collect()
+        let sides = self.rings().flat_map(|ring| ring_sides(ring)).map(|(c, d)| [mm(c), mm(d)]);
+        parts(a, b, sides, |p| self.contains(p))
     }
 
     /// Checks what the module promises of every region: rings of three points or more, outer rings
@@ -359,6 +337,36 @@ pub fn signed_area(ring: &[GridPoint]) -> f64 {
 #[must_use]
 pub fn ring_length(ring: &[GridPoint]) -> f64 {
     ring_sides(ring).map(|(a, b)| (mm(b) - mm(a)).norm()).sum()
+}
+
+/// Returns the segment from `a` to `b` cut where it meets these sides, in order.
+pub(crate) fn parts(
+    a: &Point2<f64>,
+    b: &Point2<f64>,
+    sides: impl Iterator<Item = [Point2<f64>; 2]>,
+    is_inside: impl Fn(&Point2<f64>) -> bool,
+) -> Vec<Part> {
+    let along = b - a;
+    let mut cuts: Vec<f64> = Vec::new();
+    for [c, d] in sides {
+        let (c_side, d_side) = (along.perp(&(c - a)), along.perp(&(d - a)));
+        if (c_side > 0.0) != (d_side > 0.0) {
+            let meeting = c + (d - c) * (c_side / (c_side - d_side));
+            cuts.push((meeting - a).dot(&along) / along.norm_squared());
+        }
+    }
+    cuts.retain(|share| 0.0 < *share && *share < 1.0);
+    cuts.sort_unstable_by(f64::total_cmp);
+    let points: Vec<Point2<f64>> = std::iter::once(*a)
+        .chain(cuts.iter().map(|share| a + along * *share))
+        .chain([*b])
+        .collect();
+    let part = |ends: &[Point2<f64>]| Part {
+        from: ends[0],
+        to: ends[1],
+        inside: is_inside(&nalgebra::center(&ends[0], &ends[1])),
+    };
+    points.windows(2).map(part).collect()
 }
 
 /// Returns whether two segments cross or touch, apart from rounding.

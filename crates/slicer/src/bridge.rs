@@ -8,6 +8,7 @@
 //!
 //! On curved layers lines are straight as seen along the axis.
 
+use geom::bands::Bands;
 use geom::region::{Fill, Region};
 use nalgebra::{Point2, Vector2};
 
@@ -80,6 +81,7 @@ struct Spans {
 fn direction(gap: &Region, below: &Region, chart: &Chart, spacing: f64) -> Option<f64> {
     let near = below.intersection(&chart.outset(gap, 2.0 * ANCHOR_IN_SPACINGS * spacing));
     let (gap, near) = (chart.region_from_above(gap), chart.region_from_above(&near));
+    let near = Bands::of(&near);
     let spans: Vec<Spans> = (0..DIRECTIONS)
         .map(|k| f64::from(k) * std::f64::consts::PI / f64::from(DIRECTIONS))
         .filter_map(|angle| spans(&gap, &near, angle, spacing))
@@ -92,7 +94,7 @@ fn direction(gap: &Region, below: &Region, chart: &Chart, spacing: f64) -> Optio
         .map(|s| s.angle)
 }
 
-fn spans(gap: &Region, near: &Region, angle: f64, spacing: f64) -> Option<Spans> {
+fn spans(gap: &Region, near: &Bands, angle: f64, spacing: f64) -> Option<Spans> {
     let along = Vector2::new(angle.cos(), angle.sin());
     let (mut all, mut anchored, mut longest) = (0.0, 0.0, 0.0_f64);
     for [from, to] in straight_lines(gap, spacing, angle) {
@@ -114,18 +116,22 @@ fn spans(gap: &Region, near: &Region, angle: f64, spacing: f64) -> Option<Spans>
 #[must_use]
 pub fn spanned(gaps: &Region, below: &Region, chart: &Chart, spacing: f64, longest: f64) -> Region {
     let mut strips: Vec<Vec<Point2<f64>>> = Vec::new();
-    for island in chart.opened(gaps, LEAST_GAP_IN_SPACINGS * spacing / 2.0).islands() {
+    let gaps = chart.opened(gaps, LEAST_GAP_IN_SPACINGS * spacing / 2.0);
+    if gaps.is_empty() {
+        return gaps;
+    }
+    let seen_below = Bands::of(&chart.region_from_above(below));
+    for island in gaps.islands() {
         let gap = Region::from_island(island.clone());
         let Some(angle) = direction(&gap, below, chart, spacing) else { continue };
         let along = Vector2::new(angle.cos(), angle.sin());
         // A little wider than their distance, so that strips beside each other leave nothing.
         let aside = Vector2::new(-along.y, along.x) * (0.51 * spacing);
         let gap = chart.region_from_above(&gap);
-        let below = chart.region_from_above(below);
         for [from, to] in straight_lines(&gap, spacing, angle) {
             let way = along * (to - from).dot(&along).signum() * spacing;
             let (from, to) = (from - way, to + way);
-            let is_anchored = below.contains(&from) && below.contains(&to);
+            let is_anchored = seen_below.contains(&from) && seen_below.contains(&to);
             if is_anchored && (to - from).norm() <= longest + 2.0 * spacing {
                 strips.push(vec![from - aside, to - aside, to + aside, from + aside]);
             }

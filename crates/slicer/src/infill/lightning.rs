@@ -11,6 +11,7 @@
 //! mm. Distances are those of the chart: true along the meridian, at most too long across it, where
 //! branches stand a little closer than they need to.
 
+use geom::bands::Bands;
 use geom::grid::mm;
 use geom::polyline::{distance_to_segment, share_nearest};
 use geom::region::{Region, ring_sides};
@@ -170,6 +171,10 @@ fn straightened(mut nodes: Vec<Node>, reach: f64) -> Vec<Node> {
 
 /// Cuts trees to the area: what is left beyond a cut stands on its own.
 fn cut(nodes: &[Node], core: &Region) -> Vec<Node> {
+    if nodes.is_empty() {
+        return Vec::new();
+    }
+    let core = Bands::of(core);
     let mut cut: Vec<Node> = Vec::new();
     // Where each place is now, if it lies inside.
     let mut moved: Vec<Option<usize>> = vec![None; nodes.len()];
@@ -225,6 +230,7 @@ fn grounded(nodes: &[Node], walls: &Segments) -> Vec<Node> {
 /// Adds tips where the layer above closes the part and nothing is near.
 fn carry(nodes: &mut Vec<Node>, stratum: &Stratum, walls: &Segments, radius: f64) {
     let Some(bounds) = stratum.closed.bounds() else { return };
+    let closed = Bands::of(&stratum.closed);
     let step = radius / STEPS_IN_RADIUS;
     let (low, high) = (mm(bounds.min), mm(bounds.max));
     let steps = |from: f64, to: f64| (from / step).ceil() as i64..=(to / step).floor() as i64;
@@ -232,7 +238,7 @@ fn carry(nodes: &mut Vec<Node>, stratum: &Stratum, walls: &Segments, radius: f64
     for x in steps(low.x, high.x).map(|column| column as f64 * step) {
         // A whole column at once: asking for each place would look at all sides again.
         let [from, to] = [low.y - step, high.y + step].map(|y| Point2::new(x, y));
-        for part in stratum.closed.parts(&from, &to).into_iter().filter(|part| part.inside) {
+        for part in closed.parts(&from, &to).into_iter().filter(|part| part.inside) {
             for y in steps(part.from.y, part.to.y).map(|row| row as f64 * step) {
                 let at = Point2::new(x, y);
                 if let Some((wall, off, _)) = walls.nearest(&at, f64::INFINITY)
