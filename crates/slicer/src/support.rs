@@ -12,6 +12,7 @@
 //! sloping layers it begins in each of them a little beside the one below, and would hang there.
 
 use geom::grid::{mm, snap};
+use geom::offset::COARSE_TOLERANCE_MM;
 use geom::region::{Fill, Island, Region, Ring};
 use nalgebra::{Point2, Rotation2};
 use rayon::prelude::*;
@@ -168,17 +169,12 @@ impl Column {
 pub fn columns(layers: &[Shade], params: &SupportParams) -> Vec<Column> {
     let contacts = contacts(layers, params);
     let needed = needed(layers, &contacts);
-    let clear: Vec<Region> = layers
-        .par_iter()
-        .zip(&needed)
-        .map(|(layer, needed)| {
-            if needed.is_empty() {
-                Region::default()
-            } else {
-                layer.material.outset_coarsely(params.xy_gap)
-            }
-        })
-        .collect();
+    // Arcs around corners of the part are cut by as much, and by beads along them once more.
+    let aside = params.xy_gap + 2.0 * COARSE_TOLERANCE_MM;
+    let clear = |(layer, needed): (&Shade, &Region)| {
+        if needed.is_empty() { Region::default() } else { layer.material.outset_coarsely(aside) }
+    };
+    let clear: Vec<Region> = layers.par_iter().zip(&needed).map(clear).collect();
     let mut columns: Vec<Column> = (0..layers.len())
         .into_par_iter()
         .map(|k| column(k, layers, (&contacts, &needed, &clear[k]), params))
