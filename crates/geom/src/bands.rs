@@ -2,7 +2,8 @@
 //!
 //! The sides of all rings are sorted into horizontal bands, each into all that it runs through: what a
 //! point or a segment can meet lies in its own bands. Answers are those of the methods of the same names
-//! of [`Region`], which look at every side.
+//! of [`Region`], which look at every side. What they cost grows with the sides of a band alone, and the
+//! memory with all sides, however tall.
 
 use nalgebra::Point2;
 
@@ -25,8 +26,12 @@ pub struct Bands {
 /// Bands hold a few sides each, where sides are short.
 const SIDES_PER_BAND: usize = 4;
 
-/// Nor are there more than so many: a side as high as the region lies in all of them.
+/// Nor are there more than so many.
 const MOST_BANDS: usize = 256;
+
+/// Nor so many that sides lie in more than these on the average, beside the one that they begin in: a side
+/// as high as the region lies in all of them, and memory is not to grow with both.
+const BANDS_PER_SIDE: f64 = 4.0;
 
 impl Bands {
     /// Sorts the sides of a region.
@@ -34,11 +39,15 @@ impl Bands {
     pub fn of(region: &Region) -> Self {
         let Some(bounds) = region.bounds() else { return Self::default() };
         let (low, high) = (mm(bounds.min).y, mm(bounds.max).y);
-        let count = (region.point_count() / SIDES_PER_BAND).clamp(1, MOST_BANDS);
-        let per_mm = count as f64 / (high - low).max(f64::MIN_POSITIVE);
-        let mut bands = Self { sides: Vec::new(), begins: vec![0; count + 1], low, per_mm };
+        let height = (high - low).max(f64::MIN_POSITIVE);
         let sides =
             || region.rings().flat_map(|ring| ring_sides(ring)).map(|(a, b)| [mm(a), mm(b)]);
+        let climb: f64 = sides().map(|[a, b]| (b.y - a.y).abs()).sum();
+        let affordable = BANDS_PER_SIDE * region.point_count() as f64 * height / climb;
+        let most = MOST_BANDS.min(affordable as usize).max(1);
+        let count = (region.point_count() / SIDES_PER_BAND).clamp(1, most);
+        let per_mm = count as f64 / height;
+        let mut bands = Self { sides: Vec::new(), begins: vec![0; count + 1], low, per_mm };
         for side in sides() {
             for band in bands.met_by(&side) {
                 bands.begins[band + 1] += 1;
@@ -169,6 +178,24 @@ mod tests {
         assert!((500..3000).contains(&inside), "{inside}");
         assert!(!Bands::of(&Region::default()).contains(&Point2::origin()));
         assert!(!Bands::default().contains_segment(&Point2::origin(), &Point2::new(1.0, 1.0)));
+    }
+
+    #[test]
+    fn tall_sides_take_no_more_memory_than_short_ones() {
+        // A comb of teeth as high as itself.
+        let mut ring = vec![Point2::new(1000.0, -1.0), Point2::new(0.0, -1.0)];
+        ring.reverse();
+        for k in (0..1000).map(f64::from).rev() {
+            let teeth = [[k + 1.0, 0.0], [k + 0.5, 100.0], [k, 0.0]];
+            ring.extend(teeth.map(Point2::from));
+        }
+        let comb = Region::from_rings([ring.as_slice()], Fill::NonZero);
+        for region in [comb, region()] {
+            let (bands, sides) = (Bands::of(&region), region.point_count());
+            assert!(bands.sides.len() <= 6 * sides, "{} of {sides}", bands.sides.len());
+            let p = Point2::new(700.5, 50.0);
+            assert_eq!(bands.contains(&p), region.contains(&p));
+        }
     }
 
     #[test]

@@ -555,6 +555,8 @@ mod tests {
                 let rings: Vec<Ring> = rings.iter().map(|ring| (*ring).clone()).collect();
                 Region::from_grid_rings(&rings, Fill::Positive)
             };
+            // A hole that crosses one of the other, beside rings in common.
+            let crossing = turned(wavy(-25_000, 7_000, 20_000.0, 20, seed + 3.0));
             let one = of(&[&outer, &shared, &own]);
             for other in [of(&[&outer, &shared]), of(&[&plug]), of(&[&outer]), one.clone()] {
                 for rule in [OverlayRule::Union, OverlayRule::Intersect, OverlayRule::Difference] {
@@ -569,7 +571,20 @@ mod tests {
                     }
                 }
             }
+            let other = of(&[&outer, &shared, &crossing]);
+            for rule in [OverlayRule::Union, OverlayRule::Intersect, OverlayRule::Difference] {
+                let (ours, swept) = (one.combined(&other, rule), one.swept_with(&other, rule));
+                ours.check();
+                let rounding = crossing_rounding(&one, &other);
+                assert!(differing(&ours, &swept) <= rounding, "{seed} {rule:?}");
+            }
         }
+    }
+
+    /// What the rounding of crossings may change of a boolean, mm²: each by a step, the other way than the
+    /// engine does.
+    fn crossing_rounding(one: &Region, other: &Region) -> f64 {
+        (one.perimeter() + other.perimeter()) * 2.0 / STEPS_PER_MM
     }
 
     #[test]

@@ -238,36 +238,42 @@ fn add_to_group(groups: &mut Vec<Vec<WallLoop>>, added: WallLoop, width: f64, is
 
 /// The beads of a wall in tight places: all that is laid in a place has just its volume.
 struct TightBeads {
-    places: Vec<(Region, Bead)>,
-    /// The boxes around them: most of a wall is near none.
-    boxes: Vec<GridBounds>,
+    places: Vec<TightPlace>,
+}
+
+/// A place where two beads overlap.
+struct TightPlace {
+    region: Region,
+    /// The box around it: most of a wall is near no such place.
+    around: GridBounds,
+    bead: Bead,
 }
 
 impl TightBeads {
     /// `lines` are all centrelines that run through the places.
     fn new(tight: &Region, lines: &Region, bead: Bead) -> Self {
-        let places: Vec<(Region, Bead)> = tight
+        let places = tight
             .islands()
             .iter()
-            .map(|island| {
-                let place = Region::from_island(island.clone());
-                let around = place.bounds();
+            .filter_map(|island| {
+                let region = Region::from_island(island.clone());
+                let around = region.bounds()?;
                 let length: f64 = lines
                     .rings()
                     .flat_map(|ring| ring_sides(ring))
-                    .filter(|side| around.is_some_and(|around| may_meet(&around, side)))
-                    .flat_map(|(a, b)| place.parts(&mm(a), &mm(b)))
+                    .filter(|side| may_meet(&around, side))
+                    .flat_map(|(a, b)| region.parts(&mm(a), &mm(b)))
                     .filter(|part| part.inside)
                     .map(|part| part.length())
                     .sum();
-                let share = place.area() / length;
+                let share = region.area() / length;
                 // A line that only clips the corner of a place is not to blame for its area.
                 let spacing = share.clamp(bead.spacing() / 2.0, bead.spacing());
-                (place, Bead::with_spacing(spacing, bead.thickness))
+                let bead = Bead::with_spacing(spacing, bead.thickness);
+                Some(TightPlace { region, around, bead })
             })
             .collect();
-        let boxes = places.iter().filter_map(|(place, _)| place.bounds()).collect();
-        Self { places, boxes }
+        Self { places }
     }
 
     /// The points of a centreline with their beads; where the bead changes there are two.
@@ -275,13 +281,13 @@ impl TightBeads {
         let mut points: Vec<(Point2<f64>, Bead)> = Vec::with_capacity(ring.len());
         for (a, b) in ring_sides(ring) {
             let mut pieces = vec![(Part { from: mm(a), to: mm(b), inside: false }, bead)];
-            let near = self.places.iter().zip(&self.boxes);
-            for ((place, narrow), _) in near.filter(|(_, around)| may_meet(around, &(a, b))) {
+            let near = |place: &&TightPlace| may_meet(&place.around, &(a, b));
+            for place in self.places.iter().filter(near) {
                 pieces = pieces
                     .into_iter()
                     .flat_map(|(piece, old)| {
-                        place.parts(&piece.from, &piece.to).into_iter().map(move |part| {
-                            let bead = if part.inside { *narrow } else { old };
+                        place.region.parts(&piece.from, &piece.to).into_iter().map(move |part| {
+                            let bead = if part.inside { place.bead } else { old };
                             (part, bead)
                         })
                     })
