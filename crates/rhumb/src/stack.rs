@@ -145,9 +145,10 @@ impl<'a> Stack<'a> {
             let runs: Vec<_> = ahead.runs(window).into_par_iter().map(core).collect();
             for (run, pieces) in runs {
                 let size = pieces.as_ref().map_or(0, Pieces::size);
-                let pieces = pieces.filter(|_| size <= room);
-                room = if pieces.is_some() { room - size } else { 0 };
-                self.kept.push(Mutex::new(pieces));
+                // The lowest: once there is no room, none of those above are kept.
+                let left = room.checked_sub(size);
+                room = left.unwrap_or(0);
+                self.kept.push(Mutex::new(pieces.filter(|_| left.is_some())));
                 self.kept.extend(run[1..].iter().map(|_| Mutex::default()));
                 cores.extend(run);
             }
@@ -611,6 +612,48 @@ impl<'a> Stack<'a> {
 mod tests {
     use super::*;
     use crate::settings::Settings;
+    use crate::shelf::Shelf;
+
+    /// What was put by to find branches is what a layer is taken apart into when it is printed, supports and
+    /// all, on planes and on cones.
+    #[test]
+    fn layers_that_were_kept_are_filled_as_if_they_were_not() {
+        for (model, layers) in [("mushroom", "planar"), ("gear", "planar"), ("umbrella", "conical")]
+        {
+            let solid = Solid::new(mesh::shapes::by_name(model).unwrap());
+            let mut settings = Settings::defaults();
+            settings.set(&format!("layers={layers}")).unwrap();
+            settings.set("fill_pattern=lightning").unwrap();
+            settings.set("extra_perimeters=true").unwrap();
+            let job = Job::resolve(&settings).unwrap();
+            let (stages, _) = crate::stages::stages(&solid, &job).unwrap();
+            let stage = stages.last().unwrap();
+            let below = stages.iter().rev().nth(1);
+            let shelf = Shelf::of(stage.levels.len());
+            let columns: Vec<Column> = vec![Column::default(); stage.printed.len()];
+            let fill = |forget: bool| -> Vec<Filled> {
+                let mut stack = Stack::new(&solid, stage, below, &job);
+                stack.stand_on(&columns);
+                if !forget {
+                    stack.share(Use::Empty(&shelf));
+                }
+                stack.grow(&Interrupt::default()).unwrap();
+                let kept = stack.kept.iter().filter(|kept| kept.lock().unwrap().is_some()).count();
+                assert!(kept > 0, "{model}");
+                if forget {
+                    stack.kept.clear();
+                }
+                let starts = stage.printed.clone().step_by(WINDOW);
+                let window = |from: usize| {
+                    let window = from..(from + WINDOW).min(stage.printed.end);
+                    stack.reach(&window, |_| {});
+                    stack.fill(window)
+                };
+                starts.flat_map(window).collect()
+            };
+            assert!(fill(true) == fill(false), "{model}");
+        }
+    }
 
     /// Layers that repeat the one below are what they would be if each were taken apart.
     #[test]
